@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from operator import attrgetter
 from pathlib import Path
 
 from PySide6.QtCore import QPoint, QPointF, Qt
@@ -40,6 +41,22 @@ for (const kind of ['pointerdown', 'pointerup', 'keydown', 'focusin', 'focusout'
 
 def workspace(*blocks: dict) -> dict:
     return {"blocks": {"languageVersion": 0, "blocks": list(blocks)}}
+
+
+def received(view: BlocklyView, kind: type, *fields: str) -> list:
+    """Return the messages of this class from the page; the list grows with each message.
+
+    With names of fields, the list contains the values of these fields, or of the only one, instead.
+    """
+    found: list = []
+    read = attrgetter(*fields) if fields else lambda message: message
+
+    def add(message: object) -> None:
+        if isinstance(message, kind):
+            found.append(read(message))
+
+    view.message_received.connect(add)
+    return found
 
 
 def outlined(name: str) -> str:

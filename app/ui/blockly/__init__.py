@@ -1,4 +1,5 @@
 """Widget with the web page of the block editor, and the messages between window and page.
 
-`view` contains the widget, `bridge` the calls in both directions; the page itself is `app/blocks/editor/`.
+`view` contains the widget, `bridge` the channel, `messages` the messages in both directions; the page itself
+is `app/blocks/editor/`.
 """

@@ -9,10 +9,10 @@ import json
 import logging
 import time
 from collections.abc import Mapping
-from typing import cast
+from typing import Literal, cast
 
 from PySide6.QtCore import QCoreApplication, QEvent, QObject, Qt, QTimer, QUrl, Signal
-from PySide6.QtGui import QColor, QKeyEvent, QKeySequence, QShowEvent
+from PySide6.QtGui import QColor, QGuiApplication, QKeyEvent, QKeySequence, QShowEvent
 from PySide6.QtWebChannel import QWebChannel
 from PySide6.QtWebEngineCore import QWebEnginePage, QWebEngineProfile, QWebEngineSettings
 from PySide6.QtWebEngineWidgets import QWebEngineView
@@ -20,7 +20,8 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app import resources
 from app.core.reports.crash import crash_extra
-from app.ui.blockly.bridge import BlocklyBridge, Json
+from app.ui.blockly import messages
+from app.ui.blockly.bridge import BlocklyBridge
 from app.ui.blockly.key_buffer import KeyBuffer
 from app.ui.blockly.scheme import PAGE_URL, SCHEME, RequestBlocker, SchemeHandler, register_scheme
 from app.ui.widgets.keyboard import focus_proxy, is_keyboard_navigation
@@ -29,6 +30,9 @@ from nep import i18n
 _log = logging.getLogger(__name__)
 _RESTART_DELAYS_MS = (0, 500, 2000, 5000)
 _STABLE_AFTER_S = 60.0
+CLIPBOARD_PREFIX = '{"nepStudio":'
+"""Prefix of the clipboard's text if it contains copied blocks; the same as in `clipboard.ts`."""
+MAX_CLIPBOARD_CHARS = 5_000_000
 _FUNCTION_KEYS = range(Qt.Key.Key_F1, Qt.Key.Key_F12 + 1)
 _Attribute = QWebEngineSettings.WebAttribute
 _DISABLED_ATTRIBUTES = (
@@ -115,20 +119,16 @@ class BlocklyHost(QWidget):
         self._language = language
         self._web: BlocklyWeb | None = None
         self._is_page_ready = False
-        self._theme: Json = {}
+        self._theme: messages.EditorTheme | None = None
         self._is_motion_reduced = False
         self._is_pinned: bool | None = None
         self._termination_count = 0
         self._has_terminated = False
         self._ready_since_s = 0.0
-        self._bridge = BlocklyBridge(self._initial_settings, self)
-        self._bridge.page_ready.connect(self._on_page_ready)
+        self._bridge = BlocklyBridge(self._receive, self)
         self._keys = KeyBuffer(lambda: self._web.keyboard_target() if self._web is not None else None)
-        self._requested_field = ""  # requested field: "find" or "search"; "" when it has the focus
-        self._bridge.field_opened.connect(self._on_field_opened)
+        self._requested_field: messages.RunCommand | None = None  # None when the field has the focus
         self._is_block_focused = False
-        self._bridge.block_focused.connect(self._on_block_focused)
-        self._bridge.error_reported.connect(lambda message: _log.error("block editor: %s", message))
         self._layout = QVBoxLayout(self)
         self._layout.setContentsMargins(0, 0, 0, 0)
 
@@ -149,18 +149,18 @@ class BlocklyHost(QWidget):
             tokens: Design tokens: the parsed token file, or `Theme.blockly_tokens()`.
             is_dark: True for the dark theme.
         """
-        self._theme = {"tokens": dict(tokens), "dark": is_dark}
+        self._theme = messages.EditorTheme(dict(tokens), is_dark)
         if isinstance(tokens.get("reducedMotion"), bool):
             self.set_reduced_motion(bool(tokens["reducedMotion"]))
         if self._web is not None:
             self._apply_theme(self._web)
-        self._send_command("theme", self._theme)
+        self._send(messages.SetTheme(self._theme))
 
     def set_reduced_motion(self, is_reduced: bool) -> None:
         """Select a steady glow for running blocks if ``is_reduced`` is True, else an animated one."""
         if is_reduced != self._is_motion_reduced:
             self._is_motion_reduced = is_reduced
-            self._send_command("motion", {"reduced": is_reduced})
+            self._send(messages.SetReducedMotion(is_reduced))
 
     # -- for the view -----------------------------------------------------------------------------
 
@@ -172,19 +172,23 @@ class BlocklyHost(QWidget):
         # Overridden by subclasses: the page and its state are lost.
         ...
 
-    def _send_command(self, command: str, payload: object) -> None:
-        # Commands without a page are dropped; `_on_page_loaded` sends the complete state to a later page.
-        if self._is_page_ready:
-            self._bridge.send_command(command, payload)
+    def _receive(self, message: messages.PageMessage) -> None:
+        # Overridden by subclasses: the page sent a message.
+        ...
 
-    def _request_field(self, field: str) -> None:
+    def _send(self, message: messages.WindowMessage) -> None:
+        # Messages without a page are dropped; `_on_page_loaded` sends the complete state to a later page.
+        if self._is_page_ready:
+            self._bridge.send(message)
+
+    def _request_field(self, field: Literal["find", "search"]) -> None:
         # Holds keys that are pressed before the field has the focus.
         if self._web is None:
             return
-        self._requested_field = field
+        self._requested_field = messages.RunCommand(field)
         self._install_key_filter()
         self._keys.start()
-        self._send_command(field, None)
+        self._send(self._requested_field)
 
     # -- page -------------------------------------------------------------------------------------
 
@@ -199,7 +203,7 @@ class BlocklyHost(QWidget):
         if self._keys.buffer_event(event):
             return True
         if event.type() == QEvent.Type.FocusIn and is_keyboard_navigation():
-            self._send_command("keyboard", None)
+            self._send(messages.RunCommand("showFocus"))
         is_override = event.type() == QEvent.Type.ShortcutOverride and self._is_block_focused
         if is_override and _is_help_key(cast("QKeyEvent", event)):
             event.accept()  # on a block, F1 shows the block's help instead of the window's
@@ -209,7 +213,7 @@ class BlocklyHost(QWidget):
             # A shortcut of the window is handled before the key press arrives here.
             if key.key() in _FUNCTION_KEYS and key.modifiers() == Qt.KeyboardModifier.NoModifier:
                 if self._is_block_focused and _is_help_key(key):
-                    self._send_command("help", None)
+                    self._send(messages.RunCommand("help"))
                 else:
                     self.key_pressed.emit(QKeySequence(key.key()).toString())
                 return True
@@ -238,8 +242,7 @@ class BlocklyHost(QWidget):
     def _apply_theme(self, web: BlocklyWeb) -> None:
         # Styles outside the page's control: background before the first paint, text size.
         web.page.setBackgroundColor(self._background_colour())
-        tokens = cast("Mapping[str, object]", self._theme["tokens"])
-        percent = tokens.get("textPercent")
+        percent = self._loaded_theme().tokens.get("textPercent")
         web.view.setZoomFactor(percent / 100 if isinstance(percent, int | float) else 1.0)
 
     def _install_key_filter(self) -> None:
@@ -255,38 +258,56 @@ class BlocklyHost(QWidget):
             if isinstance(key_target, QWidget):
                 key_target.setAcceptDrops(False)  # the window handles dropped files
 
-    def _initial_settings(self) -> Json:
-        if not self._theme:
+    def _loaded_theme(self) -> messages.EditorTheme:
+        if self._theme is None:
             tokens = json.loads(resources.path("theme", "tokens.json").read_text("utf-8"))
-            self._theme = {"tokens": tokens, "dark": False}
-        return {
-            "language": self._language,
-            "words": dict(i18n.editor_translations()),
-            "reduced": self._is_motion_reduced,
-            "pinned": self._is_pinned,
-            "theme": self._theme,
-        }
+            self._theme = messages.EditorTheme(tokens, is_dark=False)
+        return self._theme
 
     def _background_colour(self) -> QColor:
-        tokens = cast("Mapping[str, Mapping[str, object]]", self._initial_settings()["theme"])["tokens"]
-        colours = cast("Mapping[str, object]", tokens["colour"])
-        mode = colours.get("dark" if self._theme["dark"] else "light", colours)
+        theme = self._loaded_theme()
+        colours = cast("Mapping[str, object]", theme.tokens["colour"])
+        mode = colours.get("dark" if theme.is_dark else "light", colours)
         return QColor(str(cast("Mapping[str, object]", mode)["workspace"]))
 
-    def _on_field_opened(self) -> None:
-        self._requested_field = ""
-        self._keys.release()
+    def _on_host_message(self, message: messages.HostMessage) -> None:
+        match message:
+            case messages.PageOpened():
+                self._start_page()
+            case messages.PageReady():
+                self._on_page_ready()
+            case messages.PageFailed():
+                _log.error("block editor: %s", message.text)
+            case messages.FieldOpened():
+                self._requested_field = None
+                self._keys.release()
+            case messages.BlockFocusChanged():
+                self._is_block_focused = message.is_focused
+            case messages.BlocksCopied():
+                QGuiApplication.clipboard().setText(message.text)
+            case messages.ClipboardRequested():
+                self._bridge.send(messages.ClipboardText(copied_blocks()))
+            case _:
+                messages.reject_unhandled(message)
 
-    def _on_block_focused(self, is_focused: bool) -> None:
-        self._is_block_focused = is_focused
+    def _start_page(self) -> None:
+        self._bridge.send(
+            messages.StartEditor(
+                self._language,
+                dict(i18n.editor_translations()),
+                self._is_motion_reduced,
+                self._is_pinned,
+                self._loaded_theme(),
+            )
+        )
 
     def _on_page_ready(self) -> None:
         self._is_page_ready = True
         self._ready_since_s = time.monotonic()
         self._install_key_filter()
         self._on_page_loaded()
-        if self._requested_field:
-            self._send_command(self._requested_field, None)
+        if self._requested_field is not None:
+            self._send(self._requested_field)
         self.ready.emit()
         if self._has_terminated:
             self._has_terminated = False
@@ -304,7 +325,7 @@ class BlocklyHost(QWidget):
         )
         self._is_page_ready = self._is_block_focused = False
         self._has_terminated = True
-        self._requested_field = ""
+        self._requested_field = None
         self._keys.discard_all()
         self._on_page_lost()
         if time.monotonic() - self._ready_since_s > _STABLE_AFTER_S:
@@ -313,6 +334,15 @@ class BlocklyHost(QWidget):
         self._termination_count += 1
         if self._web is not None:
             QTimer.singleShot(delay_ms, self._web.page, self._web.start)
+
+
+def copied_blocks() -> str:
+    """Return the serialized blocks on the system clipboard; "" if it contains anything else.
+
+    The page must not read other contents of the clipboard.
+    """
+    text = QGuiApplication.clipboard().text()
+    return text if text.startswith(CLIPBOARD_PREFIX) and len(text) <= MAX_CLIPBOARD_CHARS else ""
 
 
 def _is_help_key(key: QKeyEvent) -> bool:

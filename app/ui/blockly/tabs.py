@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from app.blocks.model.workspace_json import EMPTY_WORKSPACE, WorkspaceJson
+from app.ui.blockly.messages import BlockState
 
 
 @dataclass
@@ -16,14 +17,14 @@ class Tab:
         workspace: Latest workspace, in Blockly's JSON format.
         generation: Number that changes when the workspace is replaced, to detect outdated edits.
         is_loaded: True if the page has loaded the tab.
-        states: Newest payload of each state of the blocks, such as highlights, by name of the command.
+        states: Newest message of each state of the blocks, such as highlights, by its type.
     """
 
     key: str
     workspace: WorkspaceJson
     generation: int
     is_loaded: bool = False  # loaded in the page, with undo stack, zoom and scroll position
-    states: dict[str, object] = field(default_factory=dict)
+    states: dict[type[BlockState], BlockState] = field(default_factory=dict)
 
 
 class Tabs:

@@ -8,14 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 
+from msgspec import convert
 from PySide6.QtCore import QByteArray, QMarginsF, QPoint, Signal
 from PySide6.QtGui import QPageLayout
 from PySide6.QtWidgets import QApplication, QWidget
 
 from app.blocks.model.workspace_json import WorkspaceJson
-from app.ui.blockly.bridge import Json
+from app.blocks.runtime.variables import VariableValue
+from app.ui.blockly import messages
 from app.ui.blockly.host import BlocklyHost
-from app.ui.blockly.page_json import decode_data_url, parse_string_pairs, parse_strings
 from app.ui.blockly.scheme import register_scheme as register_scheme
 from app.ui.blockly.tabs import Tabs
 from nep import i18n
@@ -38,71 +39,22 @@ class BlocklyView(BlocklyHost):
     """
 
     changed = Signal(str, object)  # key of a tab and its newest blocks (WorkspaceJson), 150 ms after an edit
-    history_changed = Signal(bool, bool)  # can undo, can redo; in the shown tab
-    block_selected = Signal(str)  # id of the selected block; "" if none is selected
-    canvas_button_pressed = Signal(
-        str
-    )  # name of the pressed button of the empty canvas: "robot" or "examples"
-    try_requested = Signal(str)  # script to try, as JSON (`app.blocks.model.stack`)
-    visible_sensors_changed = Signal(tuple)  # (robot, sensor) of each sensor block in the open flyout
-    command_requested = Signal(str)  # id of a window command such as "variable.rename:ID"
-    watched_variables_changed = Signal(tuple)  # ids of the variables whose values the page shows
-    toolbox_pinned = Signal(bool)  # True if the flyout stays open after a block was dragged out of it
-    blocks_deleted = Signal(int)  # number of blocks deleted at once in the shown tab
-    # position on the screen (QPoint) while blocks of that tab are dragged outside the page, None when they
-    # return
-    blocks_dragged_outside = Signal(object, str)
-    # picture of the dragged blocks: a PNG, and its device pixels per screen pixel
-    drag_picture_rendered = Signal(bytes, float)
-    # position where blocks were dropped outside the page; without `move_dragged_blocks` they return to
-    # their place
-    blocks_dropped_outside = Signal(QPoint)
-    # number of blocks transferred to the shown tab, "moved", "copied" or "added", and key of their former tab
-    blocks_transferred = Signal(int, str, str)
-    backpack_requested = Signal(str)  # backpack operation as JSON: `BackpackController`
+    message_received = Signal(object)  # a PanelMessage from the page
 
     def __init__(self, parent: QWidget | None = None, *, language: str = "") -> None:
         super().__init__(parent, language or i18n.language())
         self._tabs = Tabs()
-        self._definitions: Json = {"blocks": [], "toolbox": {"kind": "categoryToolbox", "contents": []}}
-        self._live_values: Json = {"values": {}, "old": []}
-        self._alarms: Json = {}
-        self._variable_values: Json = {}
-        self._canvas_hint: Json | None = None
-        self._backpack: list[Json] = []
-        self._pending_hint: Json | None = None  # pending highlight for a page that is not loaded yet
+        empty_toolbox = {"kind": "categoryToolbox", "contents": []}
+        self._definitions = messages.SetDefinitions({"blocks": [], "toolbox": empty_toolbox})
+        self._live_values = messages.SetLiveValues({}, ())
+        self._alarms = messages.SetAlarms({})
+        self._variable_values = messages.SetVariableValues({})
+        self._canvas_hint: messages.SetCanvasHint | None = None
+        self._backpack = messages.SetBackpack(())
+        self._pending_hint: messages.PointAt | None = None  # for a page that is not loaded yet
         self._flush_callbacks: dict[int, Callable[[WorkspaceJson], None]] = {}
         self._picture_callbacks: dict[int, Callable[[bytes], None]] = {}
         self._last_token = 0
-        self._bridge.edited.connect(self._on_edited)
-        self._bridge.undo_changed.connect(self.history_changed)
-        self._bridge.block_selected.connect(self.block_selected)
-        self._bridge.workspace_flushed.connect(self._on_workspace_flushed)
-        self._bridge.picture_rendered.connect(self._on_picture_rendered)
-        self._bridge.command_requested.connect(self.command_requested)
-        self._bridge.watched_variables_changed.connect(
-            lambda text: self.watched_variables_changed.emit(parse_strings(text))
-        )
-        self._bridge.canvas_button_pressed.connect(self.canvas_button_pressed)
-        self._bridge.try_requested.connect(self.try_requested)
-        self._bridge.flyout_pinned.connect(self._on_flyout_pinned)
-        self._bridge.blocks_deleted.connect(self.blocks_deleted)
-        self._bridge.blocks_dragged_outside.connect(
-            lambda x, y, is_outside, tab: self.blocks_dragged_outside.emit(
-                self._to_screen(x, y) if is_outside else None, tab
-            )
-        )
-        self._bridge.drag_picture_rendered.connect(
-            lambda data, ratio: self.drag_picture_rendered.emit(decode_data_url(data), ratio)
-        )
-        self._bridge.blocks_dropped_outside.connect(
-            lambda x, y: self.blocks_dropped_outside.emit(self._to_screen(x, y))
-        )
-        self._bridge.blocks_transferred.connect(self.blocks_transferred)
-        self._bridge.backpack_requested.connect(self.backpack_requested)
-        self._bridge.visible_sensors_changed.connect(
-            lambda text: self.visible_sensors_changed.emit(parse_string_pairs(text))
-        )
 
     # -- blocks -----------------------------------------------------------------------------------
 
@@ -129,7 +81,7 @@ class BlocklyView(BlocklyHost):
         evicted = self._tabs.show(key, WorkspaceJson.from_blocks(workspace))
         self._send_tab()
         if evicted is not None:
-            self._send_command("close", evicted)
+            self._send(messages.CloseTab(evicted))
 
     def close_tab(self, key: str) -> None:
         """Close a tab and discard its undo stack. An empty behaviour replaces the shown tab."""
@@ -137,7 +89,7 @@ class BlocklyView(BlocklyHost):
         if self._tabs.close(key):
             if was_shown:
                 self._send_tab()
-            self._send_command("close", key)
+            self._send(messages.CloseTab(key))
 
     def load(self, workspace: Mapping[str, object]) -> None:
         """Replace the blocks of the shown tab with those of another document.
@@ -151,7 +103,7 @@ class BlocklyView(BlocklyHost):
     def apply_edit(self, workspace: Mapping[str, object]) -> None:
         """Replace the blocks of the shown tab as one undoable edit; `changed` is not emitted."""
         self._tabs.shown_tab.workspace = WorkspaceJson.from_blocks(workspace)
-        self._send_command("change", workspace)
+        self._send(messages.ApplyEdit(workspace))
 
     def flush(self, callback: Callable[[WorkspaceJson], None]) -> None:
         """Fetch pending edits of the shown tab, then call `callback` with the latest workspace.
@@ -164,9 +116,11 @@ class BlocklyView(BlocklyHost):
             return
         self._last_token += 1
         self._flush_callbacks[self._last_token] = callback
-        self._bridge.send_command("flush", self._last_token)
+        self._bridge.send(messages.FlushWorkspace(self._last_token))
 
-    def render_picture(self, kind: str, white: bool, callback: Callable[[bytes], None]) -> None:
+    def render_picture(
+        self, kind: messages.PictureKind, white: bool, callback: Callable[[bytes], None]
+    ) -> None:
         """Render all blocks of the shown tab as an image.
 
         Args:
@@ -180,7 +134,7 @@ class BlocklyView(BlocklyHost):
             return
         self._last_token += 1
         self._picture_callbacks[self._last_token] = callback
-        self._bridge.send_command("picture", {"token": self._last_token, "kind": kind, "white": white})
+        self._bridge.send(messages.RenderPicture(self._last_token, kind, white))
 
     def render_pdf(
         self, title: str, date: str, layout: QPageLayout, callback: Callable[[bytes], None]
@@ -201,13 +155,13 @@ class BlocklyView(BlocklyHost):
         token = self._last_token
 
         def on_pdf_rendered(data: QByteArray) -> None:
-            self._send_command("printed", None)
+            self._send(messages.RunCommand("clearPages"))
             pdf_callback = self._picture_callbacks.pop(token, None)
             if pdf_callback is not None:
                 pdf_callback(bytes(data.data()))
 
-        def on_pages_laid_out(count: bytes) -> None:
-            if not count or self.web is None:
+        def on_pages_laid_out(pages: bytes) -> None:
+            if not pages or self.web is None:
                 callback(b"")
                 return
             # kept until the PDF is created, as the page may die meanwhile
@@ -217,10 +171,9 @@ class BlocklyView(BlocklyHost):
 
         paper = layout.fullRect(QPageLayout.Unit.Inch)
         margin = max(_MIN_MARGIN_INCH, *_margins(layout))
-        lengths_inch = {"width": paper.width(), "height": paper.height(), "edge": margin}
+        size = (inches * _PIXELS_PER_INCH for inches in (paper.width(), paper.height(), margin))
         self._picture_callbacks[token] = on_pages_laid_out
-        settings: Json = {name: inches * _PIXELS_PER_INCH for name, inches in lengths_inch.items()}
-        self._bridge.send_command("pages", {"token": token, "title": title, "date": date, **settings})
+        self._bridge.send(messages.LayOutPages(token, title, date, *size))
 
     def set_toolbox_pinned(self, is_pinned: bool | None) -> None:
         """Set whether the flyout stays open after a block was dragged out of it.
@@ -229,7 +182,7 @@ class BlocklyView(BlocklyHost):
             is_pinned: True to keep the flyout open, False to close it, None to decide by the available space.
         """
         self._is_pinned = is_pinned
-        self._send_command("pin", is_pinned)
+        self._send(messages.PinFlyout(is_pinned))
 
     def set_definitions(self, definitions: Mapping[str, object]) -> None:
         """Set the block definitions (see `editor_definitions`). Equal definitions are ignored.
@@ -237,28 +190,27 @@ class BlocklyView(BlocklyHost):
         The blocks, their undo stack and the open category are preserved. The change is deferred while a block
         is dragged.
         """
-        if definitions == self._definitions:
-            return
-        self._definitions = dict(definitions)
-        self._send_command("definitions", self._definitions)
+        if definitions != self._definitions.definitions:
+            self._definitions = messages.SetDefinitions(dict(definitions))
+            self._send(self._definitions)
 
     # -- state of the shown tab's blocks ----------------------------------------------------------
 
     def highlight(self, ids: Sequence[str]) -> None:
         """Highlight the blocks with these ids and no others. Fast enough for 30 calls per second."""
-        self._set_state("highlight", list(ids))
+        self._set_state(messages.HighlightBlocks(tuple(ids)))
 
     def mark_stopped(self, ids: Sequence[str]) -> None:
         """Outline the blocks with these ids, at which the program stopped."""
-        self._set_state("stopped", list(ids))
+        self._set_state(messages.MarkStopped(tuple(ids)))
 
     def set_errors(self, errors: Mapping[str, str]) -> None:
         """Set the errors shown at blocks, as messages by block id."""
-        self._set_state("errors", dict(errors))
+        self._set_state(messages.SetBlockErrors(dict(errors)))
 
     def set_warnings(self, warnings: Mapping[str, str]) -> None:
         """Set the warnings shown at blocks, as messages by block id."""
-        self._set_state("warnings", dict(warnings))
+        self._set_state(messages.SetBlockWarnings(dict(warnings)))
 
     def show_value(self, id: str, text: str) -> None:
         """Show a value at a block until the next click.
@@ -267,11 +219,11 @@ class BlocklyView(BlocklyHost):
             id: Id of a block on the canvas or in the flyout.
             text: Value as text.
         """
-        self._send_command("value", [id, text])
+        self._send(messages.ShowValue(id, text))
 
     def set_absent(self, ids: Sequence[str]) -> None:
         """Dim the blocks with these ids, because their robot is not connected."""
-        self._set_state("absent", list(ids))
+        self._set_state(messages.SetAbsent(tuple(ids)))
 
     def set_live_values(self, values: Mapping[str, str], stale_keys: Collection[str] = ()) -> None:
         """Set the displayed values of sensor blocks. This is not an edit of the behaviour.
@@ -280,16 +232,16 @@ class BlocklyView(BlocklyHost):
             values: Formatted values by block id or by ``<robot>/<property>[/<field>]``.
             stale_keys: Keys of stale values, which are dimmed.
         """
-        live_values: Json = {"values": dict(values), "old": sorted(stale_keys)}
+        live_values = messages.SetLiveValues(dict(values), tuple(sorted(stale_keys)))
         if live_values != self._live_values:
             self._live_values = live_values
-            self._send_command("live", self._live_values)
+            self._send(live_values)
 
-    def set_variable_values(self, values: Mapping[str, Mapping[str, object]]) -> None:
-        """Set the displayed values of variables, as results of `VariableValue.to_json` by id."""
-        if values != self._variable_values:
-            self._variable_values = dict(values)
-            self._send_command("values", self._variable_values)
+    def set_variable_values(self, values: Mapping[str, VariableValue]) -> None:
+        """Set the displayed values of variables, by id."""
+        if values != self._variable_values.values:
+            self._variable_values = messages.SetVariableValues(dict(values))
+            self._send(self._variable_values)
 
     def edit_variable(self, edit: Mapping[str, object]) -> None:
         """Edit a variable, or change its display.
@@ -297,7 +249,7 @@ class BlocklyView(BlocklyHost):
         Args:
             edit: Operation such as ``{"do": "new" | "rename" | "delete" | "watch" | "show", …}``.
         """
-        self._send_command("variable", dict(edit))
+        self._send(messages.EditVariable(convert(dict(edit), messages.VariableEdit)))
 
     def set_alarms(self, alarms: Mapping[str, tuple[str, str]]) -> None:
         """Set the problems of robots shown in the toolbox.
@@ -306,21 +258,17 @@ class BlocklyView(BlocklyHost):
             alarms: Pairs of status (colour of the dot) and message by robot name. The dots of other robots
                 show whether the robot is connected.
         """
-        states: Json = {
-            name: {"status": status, "words": message} for name, (status, message) in alarms.items()
-        }
-        if states != self._alarms:
-            self._alarms = states
-            self._send_command("alarms", states)
+        message = messages.SetAlarms(
+            {name: messages.RobotAlarm(status, text) for name, (status, text) in alarms.items()}
+        )
+        if message != self._alarms:
+            self._alarms = message
+            self._send(message)
 
-    def set_backpack(self, items: Sequence[Mapping[str, object]]) -> None:
-        """Set the contents of the backpack.
-
-        Args:
-            items: Mappings with ``id``, ``at`` and ``block``, newest first.
-        """
-        self._backpack = [dict(item) for item in items]
-        self._send_command("backpack", self._backpack)
+    def set_backpack(self, items: Sequence[messages.BackpackItem]) -> None:
+        """Set the contents of the backpack, newest first."""
+        self._backpack = messages.SetBackpack(tuple(items))
+        self._send(self._backpack)
 
     def set_canvas_hint(self, label: str, has_robot: bool) -> None:
         """Set the hint on the empty canvas, which suggests dragging a first block there.
@@ -329,10 +277,10 @@ class BlocklyView(BlocklyHost):
             label: Label of the suggested block, such as “when started”.
             has_robot: True if a robot is connected.
         """
-        state: Json = {"first": label, "robot": has_robot}
-        if state != self._canvas_hint:
-            self._canvas_hint = state
-            self._send_command("begin", state)
+        hint = messages.SetCanvasHint(label, has_robot)
+        if hint != self._canvas_hint:
+            self._canvas_hint = hint
+            self._send(hint)
 
     def point_at(self, block: str, name: str = "", placement_hint: str = "") -> None:
         """Highlight the category of a block type and then its block, until such a block is added.
@@ -342,33 +290,33 @@ class BlocklyView(BlocklyHost):
             name: Label of the block.
             placement_hint: Hint where to put the block.
         """
-        target: Json | None = {"block": block, "name": name, "then": placement_hint} if block else None
-        self._pending_hint = None if self._is_page_ready else target
-        self._send_command("point", target)
+        message = messages.PointAt(messages.PointerTarget(block, name, placement_hint) if block else None)
+        self._pending_hint = None if self._is_page_ready else message
+        self._send(message)
 
     # -- commands ---------------------------------------------------------------------------------
 
     def undo(self) -> None:
         """Undo the last edit in the shown tab."""
-        self._send_command("undo", None)
+        self._send(messages.RunCommand("undo"))
 
     def undo_deletion(self) -> None:
         """Restore the most recently deleted blocks, even if other edits followed."""
-        self._send_command("undelete", None)
+        self._send(messages.RunCommand("undoDeletion"))
 
     def move_dragged_blocks(self) -> None:
         """Move the most recently dragged blocks from their tab into the shown one."""
-        self._send_command("bring", None)
+        self._send(messages.RunCommand("dropBlocks"))
 
     def undo_block_move(self) -> None:
         """Undo the last `move_dragged_blocks` in both tabs."""
-        self._send_command("giveBack", None)
+        self._send(messages.RunCommand("undoDrop"))
 
     def redo(self) -> None:
         """Redo the most recently undone edit in the shown tab."""
-        self._send_command("redo", None)
+        self._send(messages.RunCommand("redo"))
 
-    def edit(self, command: str) -> None:
+    def edit(self, command: messages.EditCommand) -> None:
         """Apply an editing command to the selected block and focus the page.
 
         Has no effect if the page already has the focus, because the page has handled the key itself.
@@ -378,9 +326,9 @@ class BlocklyView(BlocklyHost):
         """
         if self.web is not None and not self._has_focus():
             self.setFocus()
-            self._send_command("edit", command)
+            self._send(messages.EditSelection(command))
 
-    def edit_from_menu(self, command: str) -> None:
+    def edit_from_menu(self, command: messages.EditCommand) -> None:
         """Apply an editing command to the page's focused text field, or to the selected block.
 
         Args:
@@ -395,7 +343,7 @@ class BlocklyView(BlocklyHost):
                 page.triggerAction(page.WebAction[PAGE_EDIT_ACTIONS[command]])
             else:
                 self.setFocus()
-                self._send_command("edit", command)
+                self._send(messages.EditSelection(command))
 
         page.runJavaScript(IS_TEXT_FIELD_FOCUSED_JS, apply_edit)
 
@@ -405,15 +353,15 @@ class BlocklyView(BlocklyHost):
 
     def zoom_in(self) -> None:
         """Zoom in by one step."""
-        self._send_command("zoom", 1)
+        self._send(messages.Zoom(1))
 
     def zoom_out(self) -> None:
         """Zoom out by one step."""
-        self._send_command("zoom", -1)
+        self._send(messages.Zoom(-1))
 
     def zoom_to_fit(self) -> None:
         """Zoom and scroll so that all blocks are visible."""
-        self._send_command("fit", None)
+        self._send(messages.RunCommand("fit"))
 
     def open_find(self) -> None:
         """Open the find bar for blocks of the shown tab."""
@@ -425,34 +373,31 @@ class BlocklyView(BlocklyHost):
 
     def show_help(self) -> None:
         """Show the help of the focused block, if there is one."""
-        self._send_command("help", None)
+        self._send(messages.RunCommand("help"))
 
     def show_block(self, id: str) -> None:
         """Scroll to a block and select it."""
-        self._send_command("show", id)
+        self._send(messages.RevealBlock(id))
 
     # -- page -------------------------------------------------------------------------------------
 
-    def _on_flyout_pinned(self, is_pinned: bool) -> None:
-        self._is_pinned = is_pinned
-        self.toolbox_pinned.emit(is_pinned)
-
-    def _to_screen(self, x: int, y: int) -> QPoint:
-        # The position may be outside the page.
+    def to_screen(self, position: messages.PagePosition) -> QPoint:
+        """Convert a position from the page to a position on the screen."""
         zoom = self.web.view.zoomFactor() if self.web is not None else 1.0
         view = self.web.view if self.web is not None else self
-        return view.mapToGlobal(QPoint(round(x * zoom), round(y * zoom)))
+        return view.mapToGlobal(QPoint(round(position.x * zoom), round(position.y * zoom)))
 
     def _on_page_loaded(self) -> None:
-        self._send_command("definitions", self._definitions)
-        self._send_command("alarms", self._alarms)
-        self._send_command("begin", self._canvas_hint)
-        self._send_command("backpack", self._backpack)
+        self._send(self._definitions)
+        self._send(self._alarms)
+        if self._canvas_hint is not None:
+            self._send(self._canvas_hint)
+        self._send(self._backpack)
         self._tabs.mark_unloaded()
         self._send_tab()
         hint, self._pending_hint = self._pending_hint, None
         if hint is not None:
-            self._send_command("point", hint)
+            self._send(hint)
 
     def _on_page_lost(self) -> None:
         picture_callbacks, self._picture_callbacks = self._picture_callbacks, {}
@@ -461,46 +406,64 @@ class BlocklyView(BlocklyHost):
         flush_callbacks, self._flush_callbacks = self._flush_callbacks, {}
         for flush_callback in flush_callbacks.values():
             flush_callback(self._tabs.shown_tab.workspace)
-        self.history_changed.emit(False, False)
-        self.visible_sensors_changed.emit(())
-        self.watched_variables_changed.emit(())
+        self.message_received.emit(messages.HistoryChanged(can_undo=False, can_redo=False))
+        self.message_received.emit(messages.SensorsShown(()))
+        self.message_received.emit(messages.VariablesWatched(()))
 
     def _send_tab(self) -> None:
         # Sends the blocks if the page doesn't have them, and their states.
         if not self._is_page_ready:
             return
         tab = self._tabs.shown_tab
-        payload: Json = {"key": tab.key}
-        if not tab.is_loaded:
-            payload |= {"generation": tab.generation, "workspace": tab.workspace.blocks}
-            tab.is_loaded = True
-        self._bridge.send_command("tab", payload)
-        for name, value in tab.states.items():
-            self._bridge.send_command(name, value)
-        self._bridge.send_command("live", self._live_values)
-        self._bridge.send_command("values", self._variable_values)
+        self._bridge.send(
+            messages.ShowTab(
+                tab.key, None if tab.is_loaded else messages.TabContent(tab.generation, tab.workspace.blocks)
+            )
+        )
+        tab.is_loaded = True
+        for state in tab.states.values():
+            self._bridge.send(state)
+        self._bridge.send(self._live_values)
+        self._bridge.send(self._variable_values)
 
-    def _set_state(self, name: str, value: object) -> None:
+    def _set_state(self, state: messages.BlockState) -> None:
         states = self._tabs.shown_tab.states
-        if states.get(name) != value:
-            states[name] = value
-            self._send_command(name, value)
+        if states.get(type(state)) != state:
+            states[type(state)] = state
+            self._send(state)
 
-    def _on_edited(self, key: str, generation: int, workspace: str) -> None:
-        tab = self._tabs.tab_for_edit(key, generation)
-        if tab is not None:
-            tab.workspace = WorkspaceJson(workspace)
-            self.changed.emit(key, tab.workspace)
+    def _receive(self, message: messages.PageMessage) -> None:
+        match message:
+            case messages.WorkspaceEdited():
+                tab = self._tabs.tab_for_edit(message.key, message.generation)
+                if tab is not None:
+                    tab.workspace = message.workspace
+                    self.changed.emit(tab.key, tab.workspace)
+            case messages.WorkspaceFlushed():
+                flush_callback = self._flush_callbacks.pop(message.token, None)
+                if flush_callback is not None:
+                    flush_callback(message.workspace)
+            case messages.PngRendered():
+                self._on_picture_rendered(message.token, message.png)
+            case messages.SvgRendered():
+                self._on_picture_rendered(message.token, message.svg.encode(errors="replace"))
+            case messages.PagesLaidOut():
+                self._on_picture_rendered(message.token, b"pages" if message.count else b"")
+            case _:
+                if isinstance(message, messages.HostMessage):
+                    self._on_host_message(message)
+                else:
+                    self._pass_on(message)
 
-    def _on_picture_rendered(self, token: int, data: str) -> None:
+    def _pass_on(self, message: messages.PanelMessage) -> None:
+        if isinstance(message, messages.FlyoutPinned):
+            self._is_pinned = message.is_pinned
+        self.message_received.emit(message)
+
+    def _on_picture_rendered(self, token: int, picture: bytes) -> None:
         callback = self._picture_callbacks.pop(token, None)
         if callback is not None:
-            callback(decode_data_url(data) if data.startswith("data:") else data.encode())
-
-    def _on_workspace_flushed(self, token: int, workspace: str) -> None:
-        callback = self._flush_callbacks.pop(token, None)
-        if callback is not None:
-            callback(WorkspaceJson(workspace))
+            callback(picture)
 
 
 def _margins(layout: QPageLayout) -> tuple[float, float, float, float]:

@@ -10,6 +10,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
 from app.core.projects.backpack import Backpack
+from app.ui.blockly.messages import BackpackMessage, PanelMessage
 from app.ui.panels.build.behaviour.backpack_storage import BackpackController
 from tests.ui.blockly_person import START, Person, workspace
 
@@ -39,6 +40,11 @@ class Window:
         self.undo: list = []
         self.backpack = Backpack(folder)
         self.keeper = BackpackController(self, self.backpack, view)  # type: ignore[arg-type]
+        view.message_received.connect(self._receive)
+
+    def _receive(self, message: PanelMessage) -> None:
+        if isinstance(message, BackpackMessage):
+            self.keeper.handle(message)
 
     def show_toast(self, words: str, _button: str = "", run=None) -> None:
         self.said.append(words)

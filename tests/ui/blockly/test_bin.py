@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 from PySide6.QtCore import QPoint, Qt
 
-from tests.ui.blockly_person import START, WAIT_MS, Person, workspace
+from app.ui.blockly.messages import BlocksDeleted
+from tests.ui.blockly_person import START, WAIT_MS, Person, received, workspace
 
 pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
@@ -32,9 +33,7 @@ def them(person) -> Person:
 
 @pytest.fixture
 def told(view) -> list[int]:
-    counts: list[int] = []
-    view.blocks_deleted.connect(counts.append)
-    return counts
+    return received(view, BlocksDeleted, "count")
 
 
 def ids(them: Person) -> list[str]:

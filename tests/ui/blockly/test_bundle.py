@@ -76,6 +76,26 @@ def test_editor_sources_pass_strict_type_checking(tools):
     assert done.returncode == 0
 
 
+def cycle(imports: dict[str, set[str]]) -> list[str]:
+    """Return the modules that are left when those without imports are removed, again and again."""
+    left = dict(imports)
+    while free := [name for name, others in left.items() if not others & left.keys()]:
+        for name in free:
+            del left[name]
+    return sorted(left)
+
+
+def test_editor_sources_have_no_import_cycles():
+    pattern = re.compile(r"""(?:from|import) '\./(\w+)'""")
+    imports = {file.stem: set(pattern.findall(file.read_text())) for file in (EDITOR / "src").glob("*.ts")}
+    assert imports["drag"] & imports.keys()
+    assert cycle(imports) == []
+
+
+def test_import_cycle_is_detected():
+    assert cycle({"a": {"b"}, "b": {"c", "d"}, "c": {"a"}, "d": set()}) == ["a", "b", "c"]
+
+
 def test_lock_file_contains_no_registry_urls():
     lock = json.loads((EDITOR / "package-lock.json").read_text())
     assert lock["packages"]

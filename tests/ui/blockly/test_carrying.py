@@ -7,7 +7,16 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QImage
 from PySide6.QtTest import QTest
 
-from tests.ui.blockly_person import START, WAIT_MS, Person, workspace
+from app.ui.blockly.messages import (
+    BlocksDeleted,
+    BlocksDraggedOutside,
+    BlocksDroppedOutside,
+    BlocksTransferred,
+    DragImageRendered,
+    HistoryChanged,
+    PanelMessage,
+)
+from tests.ui.blockly_person import START, WAIT_MS, Person, received, workspace
 
 pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
@@ -35,12 +44,22 @@ class Told:
         self.homes: list[str] = []
         self.pictures: list[tuple[bytes, float]] = []
         self.deleted: list[int] = []
-        view.blocks_dragged_outside.connect(lambda place, _home: self.places.append(place))
-        view.drag_picture_rendered.connect(lambda *each: self.pictures.append(each))
-        view.blocks_dropped_outside.connect(self.dropped.append)
-        view.blocks_transferred.connect(lambda count, how, _home: self.brought.append((count, how)))
-        view.blocks_transferred.connect(lambda _count, _how, home: self.homes.append(home))
-        view.blocks_deleted.connect(self.deleted.append)
+        self._view = view
+        view.message_received.connect(self._add)
+
+    def _add(self, message: PanelMessage) -> None:
+        match message:
+            case BlocksDraggedOutside(position):
+                self.places.append(self._view.to_screen(position) if position is not None else None)
+            case BlocksDroppedOutside(position):
+                self.dropped.append(self._view.to_screen(position))
+            case BlocksTransferred(count, how, home):
+                self.brought.append((count, how))
+                self.homes.append(home)
+            case DragImageRendered(png, ratio):
+                self.pictures.append((png, ratio))
+            case BlocksDeleted(count):
+                self.deleted.append(count)
 
 
 @pytest.fixture
@@ -270,11 +289,10 @@ def test_drag_continues_in_the_opened_tab_and_connects_to_a_script(qtbot, view, 
 def test_drag_through_a_tab_changes_neither_its_blocks_nor_its_undo_stack(qtbot, view, them, told) -> None:
     changes: list[str] = []
     view.changed.connect(lambda key, _program: changes.append(key))
-    histories: list[tuple[bool, bool]] = []
     hold_outside(them, told, TWO)
     open_tab(view, them, "b", "start")
     before = them.newest()
-    view.history_changed.connect(lambda *each: histories.append(each))
+    histories = received(view, HistoryChanged, "can_undo", "can_redo")
     them.move(ABOVE, QPoint(600, 300))
     them.wait_for(f"{SHOWN}.querySelectorAll('.blocklyDragging .control_wait').length", 1)
     go(them, told, ABOVE, QPoint(600, 300))

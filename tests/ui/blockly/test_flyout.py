@@ -7,8 +7,9 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
 from app.blocks.toolbox.definitions import editor_definitions
+from app.ui.blockly.messages import CommandRequested, FlyoutPinned, HistoryChanged
 from tests.blocks.samples import nao, robot
-from tests.ui.blockly_person import START, WAIT_MS, Person, editor, workspace
+from tests.ui.blockly_person import START, WAIT_MS, Person, editor, received, workspace
 
 pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
@@ -85,16 +86,15 @@ def test_flyout_opens_and_closes_with_the_page_width(opened):
 
 def test_pin_of_the_flyout_is_reported_and_overrides_the_page_width(qtbot, opened):
     them = opened(WIDE)
-    with qtbot.waitSignal(them.view.toolbox_pinned, timeout=WAIT_MS) as told:
-        them.click(PIN)
-    assert told.args == [False]
+    told = received(them.view, FlyoutPinned, "is_pinned")
+    them.click(PIN)
+    qtbot.waitUntil(lambda: told == [False], timeout=WAIT_MS)
     them.wait_for(SHOWN, "block")
     click_canvas(them)
     them.wait_for(SHOWN, "none")
     them.open_category("Control")
-    with qtbot.waitSignal(them.view.toolbox_pinned, timeout=WAIT_MS) as told:
-        them.click(PIN)
-    assert told.args == [True]
+    them.click(PIN)
+    qtbot.waitUntil(lambda: told == [False, True], timeout=WAIT_MS)
     them.view.resize(NARROW, 640)
     click_canvas(them)
     assert them.ask(SHOWN) == "block"
@@ -202,9 +202,9 @@ def test_dropdown_choice_in_the_flyout_applies_to_the_dragged_block(qtbot, opene
 def test_new_variable_appears_in_the_flyout_immediately(qtbot, opened, width):
     them = opened(width)
     them.open_category("Variables")
-    with qtbot.waitSignal(them.view.command_requested, timeout=WAIT_MS) as asked:
-        them.click(".blocklyFlyoutButton")
-    assert asked.args == ["variable.new"]
+    asked = received(them.view, CommandRequested, "command")
+    them.click(".blocklyFlyoutButton")
+    qtbot.waitUntil(lambda: asked == ["variable.new"], timeout=WAIT_MS)
     them.view.edit_variable({"do": "new", "name": "steps"})
     gets = "[...document.querySelectorAll('.blocklyFlyout .variables_get')].map(e => e.textContent.trim())"
     them.wait_for(f"{gets}.join().includes('steps')")
@@ -217,8 +217,7 @@ def test_new_variable_appears_in_the_flyout_immediately(qtbot, opened, width):
 @pytest.mark.parametrize("width", [WIDE, NARROW])
 def test_block_returned_to_the_flyout_adds_no_undo_step(opened, width):
     them = opened(width)
-    told: list[tuple[bool, bool]] = []
-    them.view.history_changed.connect(lambda *history: told.append(history))
+    told = received(them.view, HistoryChanged, "can_undo", "can_redo")
     them.open_category("Movement")
     start = them.hold(TURN)
     # On a narrow page the flyout closes during a drag: only the toolbox is left.

@@ -8,8 +8,9 @@ from collections.abc import Callable
 import pytest
 from PySide6.QtCore import QPoint, Qt
 
+from app.ui.blockly.messages import CanvasButtonPressed
 from app.ui.blockly.view import BlocklyView
-from tests.ui.blockly_person import START, Person
+from tests.ui.blockly_person import START, Person, received
 
 pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
@@ -47,8 +48,7 @@ def test_empty_canvas_shows_the_first_step_and_offers_a_robot_until_a_robot_conn
 ) -> None:
     assert empty.ask(SAID) == "Drag “when started” here"
     assert empty.ask(BUTTONS) == ["Use the virtual robot", "Show me", "Open an example"]
-    asked: list[str] = []
-    view.canvas_button_pressed.connect(asked.append)
+    asked = received(view, CanvasButtonPressed, "button")
     empty.click(".nepBegin button:nth-child(1)", dx=20)
     empty.click(".nepBegin button:nth-child(3)", dx=20)
     empty.until(lambda: asked == ["robot", "examples"], "the window hears what was pressed")

@@ -9,7 +9,6 @@ from PySide6.QtCore import QMimeData
 from app.blocks.model.stack import Stack
 from app.core.projects.file_format import parse_file
 from app.errors import DocumentError
-from app.ui.blockly.page_json import decode_data_url, parse_string_pairs, parse_strings
 from app.ui.shell.commands.behaviours import parse_stack
 from app.ui.widgets.field_drag import MIME_TYPE, dropped_field
 from tests import hostile
@@ -32,16 +31,6 @@ LISTS = tuple(hostile.payloads([["Pepper", "battery"], ["a", "b"]]))
 
 def text_of(payload: bytes) -> str:
     return payload.decode("utf-8", "replace")
-
-
-def test_page_values_are_parsed_or_empty() -> None:
-    for text in map(text_of, LISTS):
-        assert all(isinstance(each, str) for each in parse_strings(text))
-        assert all(len(each) == 2 for each in parse_string_pairs(text))
-        assert isinstance(decode_data_url(f"data:image/png;base64,{text}"), bytes)
-    assert parse_string_pairs('[["Pepper", "battery"]]') == (("Pepper", "battery"),)
-    assert parse_strings('["a", "b"]') == ("a", "b")
-    assert decode_data_url("data:image/png;base64,aGk=") == b"hi"
 
 
 def test_stacks_and_behaviours_are_parsed_or_rejected() -> None:

@@ -6,7 +6,8 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor
 
-from tests.ui.blockly_person import DEFINITIONS, PICTURE, START, TOKENS, WAIT_MS, outlined
+from app.ui.blockly.messages import HistoryChanged, SensorsShown
+from tests.ui.blockly_person import DEFINITIONS, PICTURE, START, TOKENS, WAIT_MS, outlined, received
 
 pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
@@ -152,12 +153,14 @@ def test_blocks_of_absent_robots_are_grey(view, person):
 def test_live_values_are_shown_without_an_edit(qtbot, view, person):
     them = person(state=PICTURE)
     shown = "document.querySelector('[data-id=battery] .nepLive').textContent.replaceAll('\\u00a0', ' ')"
-    with qtbot.assertNotEmitted(view.changed, wait=300), qtbot.assertNotEmitted(view.history_changed):
+    histories = received(view, HistoryChanged)
+    with qtbot.assertNotEmitted(view.changed, wait=300):
         view.set_live_values({"Pepper/battery": "84 %"})
         them.wait_for(shown, "84 %")
         view.set_live_values({"battery": "83 %"})
         them.wait_for(shown, "83 %")
     assert them.newest() == PICTURE
+    assert histories == []
 
 
 def test_empty_canvas_shows_only_the_grid_and_zoom_buttons(person):
@@ -214,8 +217,7 @@ def test_toolbox_reports_that_no_robot_is_connected(view, person):
 
 def test_window_is_notified_of_sensors_shown_in_the_open_toolbox(view, person):
     them = person(START)
-    told: list[tuple] = []
-    view.visible_sensors_changed.connect(told.append)
+    told = received(view, SensorsShown, "sensors")
     them.open_category("Sensors")
     them.until(lambda: told, "the sensors are told")
     assert ("Pepper", "battery") in told[-1]

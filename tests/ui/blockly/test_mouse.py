@@ -8,8 +8,9 @@ from PySide6.QtGui import QAction
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QMainWindow
 
+from app.ui.blockly.messages import HistoryChanged
 from app.ui.blockly.view import BlocklyView
-from tests.ui.blockly_person import DEFINITIONS, START, WAIT_MS, Person, workspace
+from tests.ui.blockly_person import DEFINITIONS, START, WAIT_MS, Person, received, workspace
 
 pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
@@ -72,8 +73,7 @@ def test_flush_during_a_drag_returns_a_valid_workspace(qtbot, view, person):
 
 def test_undo_and_redo_emit_history_changes(qtbot, view, person):
     them = person(START)
-    history: list[tuple[bool, bool]] = []
-    view.history_changed.connect(lambda *each: history.append(each))
+    history = received(view, HistoryChanged, "can_undo", "can_redo")
     them.click("[data-id=start] > .blocklyPath", dy=30)
     them.press(Qt.Key_Delete)
     qtbot.waitUntil(lambda: them.tops() == [] and history[-1:] == [(True, False)], timeout=WAIT_MS)
@@ -92,12 +92,6 @@ def test_block_is_copied_and_pasted_with_the_keyboard(qtbot, person):
     them.press(Qt.Key_C, Qt.ControlModifier)
     them.press(Qt.Key_V, Qt.ControlModifier)
     qtbot.waitUntil(lambda: [top["type"] for top in them.tops()] == ["events_started"] * 2, timeout=WAIT_MS)
-
-
-def test_selected_block_is_reported(qtbot, view, person):
-    them = person(START)
-    with qtbot.waitSignal(view.block_selected, timeout=WAIT_MS, check_params_cb=lambda id: id == "start"):
-        them.click("[data-id=start] > .blocklyPath", dy=30)
 
 
 def test_typing_in_a_text_field_changes_the_workspace(qtbot, view, person):

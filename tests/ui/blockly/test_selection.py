@@ -8,9 +8,10 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 
 from app.blocks.toolbox.definitions import editor_definitions
+from app.ui.blockly.messages import HistoryChanged
 from app.ui.blockly.view import BlocklyView
 from tests.blocks.samples import number, robot, started, workspace
-from tests.ui.blockly_person import WAIT_MS, Person, editor
+from tests.ui.blockly_person import WAIT_MS, Person, editor, received
 
 pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
@@ -32,9 +33,7 @@ def view(qtbot) -> BlocklyView:
 @pytest.fixture
 def can_undo(view) -> list[bool]:
     """Return the list of reports whether undo is available; the newest is the last."""
-    told: list[bool] = []
-    view.history_changed.connect(lambda can, _again: told.append(can))
-    return told
+    return received(view, HistoryChanged, "can_undo")
 
 
 @pytest.fixture

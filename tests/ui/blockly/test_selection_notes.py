@@ -8,11 +8,12 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 
 from app.blocks.toolbox.definitions import editor_definitions
+from app.ui.blockly.messages import HistoryChanged
 from app.ui.blockly.view import BlocklyView
 from tests.blocks.samples import robot, started, workspace
 from tests.ui.blockly.test_block_menu import ROWS, looked_at
 from tests.ui.blockly.test_selection import CHOSEN, click, undo, wait_block
-from tests.ui.blockly_person import WAIT_MS, Person, editor
+from tests.ui.blockly_person import WAIT_MS, Person, editor, received
 
 pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
@@ -27,9 +28,7 @@ def view(qtbot) -> BlocklyView:
 
 @pytest.fixture
 def can_undo(view) -> list[bool]:
-    told: list[bool] = []
-    view.history_changed.connect(lambda can, _again: told.append(can))
-    return told
+    return received(view, HistoryChanged, "can_undo")
 
 
 def note(id: str, y: int) -> dict:

@@ -10,8 +10,9 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 
 from app.blocks.model.workspace_json import EMPTY_WORKSPACE, WorkspaceJson
+from app.ui.blockly.messages import HistoryChanged
 from app.ui.blockly.tabs import Tabs
-from tests.ui.blockly_person import DEFINITIONS, START, TOKENS, WAIT_MS, outlined, workspace
+from tests.ui.blockly_person import DEFINITIONS, START, TOKENS, WAIT_MS, outlined, received, workspace
 
 pytest_plugins = ["tests.ui.blockly_fixtures"]
 
@@ -70,8 +71,7 @@ def turn_to(them, key: str) -> None:
 
 @pytest.mark.web
 def test_each_tab_has_its_own_undo_stack(qtbot, view, two) -> None:
-    history: list[tuple[bool, bool]] = []
-    view.history_changed.connect(lambda *each: history.append(each))
+    history = received(view, HistoryChanged, "can_undo", "can_redo")
     delete_the_hat(qtbot, two)
     qtbot.waitUntil(lambda: history[-1:] == [(True, False)], timeout=WAIT_MS)
     turn_to(two, "b")
@@ -168,8 +168,8 @@ def test_closed_tab_is_discarded(qtbot, view, two) -> None:
 
 @pytest.mark.web
 def test_keyboard_focus_follows_the_shown_tab(qtbot, view, two) -> None:
-    with qtbot.waitSignal(view.block_selected, timeout=WAIT_MS, check_params_cb=lambda id: id == "start"):
-        two.click(PATH, dy=30)
+    two.click(PATH, dy=30)
+    two.wait_for("!!document.querySelector('.blocklySelected[data-id=start]')")
     two.press(Qt.Key_C, Qt.ControlModifier)
     for _ in range(2):  # replies are in order: the key has been handled
         two.tops()

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
-
 import pytest
 from PySide6.QtCore import Qt
 
-from tests.ui.blockly_person import PICTURE, START, WAIT_MS
+from app.ui.blockly.messages import StackTried
+from tests.ui.blockly_person import PICTURE, START, WAIT_MS, received
 
 pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
@@ -16,11 +15,9 @@ ANSWER = "(e => e && !e.hidden && e.textContent)(document.querySelector('.nepTry
 
 
 @pytest.fixture
-def asked(view) -> list[dict]:
+def asked(view) -> list[StackTried]:
     """Return the list of requests to try blocks; it grows with each request."""
-    made: list[dict] = []
-    view.try_requested.connect(lambda text: made.append(json.loads(text)))
-    return made
+    return received(view, StackTried)
 
 
 def test_click_in_the_flyout_runs_the_block_and_adds_no_block_to_the_canvas(qtbot, view, person, asked):
@@ -29,12 +26,12 @@ def test_click_in_the_flyout_runs_the_block_and_adds_no_block_to_the_canvas(qtbo
     them.click(".blocklyFlyout .control_wait > .blocklyPath", dx=8, dy=8)
     qtbot.waitUntil(lambda: bool(asked), timeout=WAIT_MS)
     (what,) = asked
-    assert (what["kind"], what["state"]["type"], what["state"]["id"]) == ("stack", "control_wait", what["id"])
-    assert what["state"]["inputs"]["SECONDS"]["shadow"]["fields"] == {"NUMBER": 1}
+    assert (what.kind, what.state["type"], what.state["id"]) == ("stack", "control_wait", what.id)
+    assert what.state["inputs"]["SECONDS"]["shadow"]["fields"] == {"NUMBER": 1}
     assert them.tops() == [START]
-    view.highlight([what["id"]])
+    view.highlight([what.id])
     them.wait_for("!!document.querySelector('.blocklyFlyout .nepState-running')")
-    view.set_errors({what["id"]: "“wait” needs a number."})
+    view.set_errors({what.id: "“wait” needs a number."})
     them.wait_for(ANSWER, "“wait” needs a number.")
     assert them.box(".nepTryAnswer")["left"] >= them.box(".blocklyFlyout")["right"], (
         "it covers no other block"
@@ -60,7 +57,7 @@ def test_try_button_next_to_the_selected_block_runs_its_stack(qtbot, view, perso
     assert handle["right"] <= block["left"] + 2
     assert block["top"] - 4 < handle["top"] < block["bottom"]
     them.click(HANDLE, dx=10, dy=10)
-    qtbot.waitUntil(lambda: asked == [{"id": "wave", "kind": "stack"}], timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: asked == [StackTried("wave", "stack", None)], timeout=WAIT_MS)
     assert them.ask("document.querySelector('.blocklySelected')?.dataset.id") == "wave", "it stays selected"
     them.press(Qt.Key_Return, Qt.ControlModifier)
     qtbot.waitUntil(lambda: len(asked) == 2, timeout=WAIT_MS)
@@ -71,7 +68,7 @@ def test_trying_an_event_block_runs_its_script(qtbot, view, person, asked):
     them = person(START)
     them.click("[data-id=start] > .blocklyPath", dy=30)
     them.click(HANDLE, dx=10, dy=10)
-    qtbot.waitUntil(lambda: asked == [{"id": "start", "kind": "hat"}], timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: asked == [StackTried("start", "hat", None)], timeout=WAIT_MS)
 
 
 def test_value_is_shown_next_to_its_block_until_the_next_key_press(qtbot, view, person):

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import msgspec
 import pytest
 from PySide6.QtCore import QPoint, Qt
 
-from app.blocks.runtime.variables import display_value
+from app.blocks.runtime.variables import VariableValue, display_value
 from app.blocks.toolbox.definitions import editor_definitions
+from app.ui.blockly.messages import CommandRequested, VariablesWatched
 from app.ui.blockly.view import BlocklyView
 from tests.blocks.samples import block, get, list_of, number, started, workspace, write
-from tests.ui.blockly_person import WAIT_MS, Person, editor
+from tests.ui.blockly_person import WAIT_MS, Person, editor, received
 
 pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
@@ -39,14 +39,14 @@ def them(person) -> Person:
     return person(state=SAVED)
 
 
-def values(**held: object) -> dict[str, dict[str, object]]:
-    return {id: msgspec.to_builtins(display_value(id, value)) for id, value in held.items()}
+def values(**held: object) -> dict[str, VariableValue]:
+    return {id: display_value(id, value) for id, value in held.items()}
 
 
 def test_watched_variable_shows_a_value_card_that_is_saved_in_the_file(qtbot, view, them) -> None:
-    with qtbot.waitSignal(view.watched_variables_changed, timeout=WAIT_MS) as watched:
-        view.edit_variable({"do": "watch", "id": "score"})
-    assert watched.args == [("score",)]
+    watched = received(view, VariablesWatched, "ids")
+    view.edit_variable({"do": "watch", "id": "score"})
+    qtbot.waitUntil(lambda: watched == [("score",)], timeout=WAIT_MS)
     them.wait_for(CARDS, [["score", UNKNOWN]])
     view.set_variable_values(values(score=2**64 - 1))
     them.wait_for(CARDS, [["score", "18446744073709551615"]])
@@ -76,8 +76,7 @@ def test_dragged_variable_card_stays_inside_the_page_and_its_position_is_saved(q
 
 
 def test_variable_dropdown_requests_the_new_and_rename_dialogs_of_the_window(qtbot, view, them) -> None:
-    asked: list[str] = []
-    view.command_requested.connect(asked.append)
+    asked = received(view, CommandRequested, "command")
     them.click("[data-id=get] .blocklyDropdownField")
     them.wait_for(f"{MENU}.length >= 4")
     entries = them.ask(MENU)
@@ -122,8 +121,7 @@ def test_rename_and_delete_of_a_variable_are_one_undo_step_each(qtbot, view, the
 
 
 def test_block_menu_offers_to_show_the_value_of_its_variable(qtbot, view, them) -> None:
-    asked: list[str] = []
-    view.command_requested.connect(asked.append)
+    asked = received(view, CommandRequested, "command")
     them.click("[data-id=set] > .blocklyPath", 10, 8)
     them.press(Qt.Key.Key_F10, Qt.KeyboardModifier.ShiftModifier)
     them.wait_for(f"{MENU}.some(e => e.startsWith('Show the value of “score”'))")
@@ -132,16 +130,14 @@ def test_block_menu_offers_to_show_the_value_of_its_variable(qtbot, view, them) 
 
 
 def test_page_can_only_trigger_allowed_commands(qtbot, view, them) -> None:
-    asked: list[str] = []
-    view.command_requested.connect(asked.append)
-    view._bridge.command("file.quit")
-    view._bridge.command("variable.new")
+    asked = received(view, CommandRequested, "command")
+    view._bridge.message('{"type": "commandRequested", "command": "file.quit"}')
+    view._bridge.message('{"type": "commandRequested", "command": "variable.new"}')
     assert asked == ["variable.new"]
 
 
 def test_new_list_becomes_the_default_of_the_list_blocks(qtbot, view, them) -> None:
-    asked: list[str] = []
-    view.command_requested.connect(asked.append)
+    asked = received(view, CommandRequested, "command")
     them.open_category("Lists")
     words = "[...document.querySelectorAll('.blocklyFlyout .blocklyFlyoutButton')].map(e => e.textContent)"
     assert them.ask(words) == ["New list"]

@@ -10,6 +10,18 @@ from PySide6.QtWidgets import QLabel, QWidget
 from app.blocks.model.workspace_json import WorkspaceJson
 from app.core.reports.not_installed import ALERT_ID
 from app.ui.intents import PressKey, ShowTab
+from app.ui.blockly.messages import (
+    BlocksDeleted,
+    BlocksDraggedOutside,
+    BlocksDroppedOutside,
+    CanvasButtonPressed,
+    DragImageRendered,
+    FlyoutPinned,
+    HistoryChanged,
+    PagePosition,
+    PanelMessage,
+    SensorsShown,
+)
 from app.ui.panels.base import Panel
 from app.ui.panels.build.behaviour.dragged_blocks import POINTER_OFFSET, DragImage, transfer_text
 from app.ui.panels.build.behaviour.panel import BehaviourPanel
@@ -25,21 +37,9 @@ class Editor(QWidget):
     """Fake block editor that records its calls."""
 
     changed = Signal(str, dict)
-    history_changed = Signal(bool, bool)
     key_pressed = Signal(str)
     recovered = Signal()
-    visible_sensors_changed = Signal(tuple)
-    command_requested = Signal(str)
-    watched_variables_changed = Signal(tuple)
-    canvas_button_pressed = Signal(str)
-    try_requested = Signal(str)
-    toolbox_pinned = Signal(bool)
-    blocks_deleted = Signal(int)
-    blocks_dragged_outside = Signal(object, str)
-    drag_picture_rendered = Signal(bytes, float)
-    blocks_dropped_outside = Signal(QPoint)
-    blocks_transferred = Signal(int, str, str)
-    backpack_requested = Signal(str)
+    message_received = Signal(object)
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
@@ -51,6 +51,9 @@ class Editor(QWidget):
         if name.startswith("_") or name == "flush":
             raise AttributeError(name)
         return lambda *given: self.told.append((name, *given))
+
+    def to_screen(self, position: PagePosition) -> QPoint:
+        return QPoint(position.x, position.y)
 
     def flush(self, done: Callable[[dict[str, object]], None]) -> None:
         if self.late:
@@ -84,6 +87,14 @@ def panel(qtbot, window) -> BehaviourPanel:
 def editor(panel: BehaviourPanel) -> Editor:
     assert isinstance(panel.editor, Editor)
     return panel.editor
+
+
+def send(panel: BehaviourPanel, message: PanelMessage) -> None:
+    editor(panel).message_received.emit(message)
+
+
+def at(position: QPoint) -> PagePosition:
+    return PagePosition(position.x(), position.y())
 
 
 def test_editor_receives_definitions_once_before_the_blocks(panel, window) -> None:
@@ -192,10 +203,10 @@ def test_sensors_in_the_open_flyout_are_watched_until_the_flyout_closes(panel, w
     window.session.document.sensors, window.session.document.edits = (), 5
     panel.refresh()
     assert window.session.looked_at == []
-    editor(panel).visible_sensors_changed.emit((("Pepper", "battery"), ("NAO", "battery")))
+    send(panel, SensorsShown((("Pepper", "battery"), ("NAO", "battery"))))
     assert window.session.looked_at == ["Pepper"]
     assert editor(panel).last("set_live_values") == {"Pepper/battery": "84 %"}
-    editor(panel).visible_sensors_changed.emit(())
+    send(panel, SensorsShown(()))
     assert window.session.looked_at == []
     assert editor(panel).last("set_live_values") == {}
 
@@ -203,7 +214,7 @@ def test_sensors_in_the_open_flyout_are_watched_until_the_flyout_closes(panel, w
 def test_robot_that_connects_while_its_sensors_are_shown_is_watched(panel, window) -> None:
     window.session.document.sensors, window.session.document.edits = (), 5
     panel.refresh()
-    editor(panel).visible_sensors_changed.emit((("Ada", "battery"),))
+    send(panel, SensorsShown((("Ada", "battery"),)))
     assert window.session.looked_at == []
     window.session.join(pepper("Ada"))
     ticks(window, panel, 6)
@@ -230,7 +241,7 @@ def test_undo_button_is_enabled_when_available_and_undoes_in_the_editor(panel, w
     title.show()
     undo, redo = button(title, "Undo"), button(title, "Redo")
     assert not undo.isEnabled()
-    editor(panel).history_changed.emit(True, False)
+    send(panel, HistoryChanged(True, False))
     assert (undo.isEnabled(), redo.isEnabled()) == (True, False)
     press(undo)
     assert editor(panel).count("undo") == 1
@@ -262,8 +273,8 @@ def test_empty_canvas_shows_the_first_step_and_its_buttons_run_commands(qtbot, q
     assert isinstance(panel, BehaviourPanel)
     qtbot.addWidget(panel.title_widget())
     assert editor(panel).told[-1] == ("set_canvas_hint", "when started", False)
-    editor(panel).canvas_button_pressed.emit("robot")
-    editor(panel).canvas_button_pressed.emit("examples")
+    send(panel, CanvasButtonPressed("robot"))
+    send(panel, CanvasButtonPressed("examples"))
     assert window.commands == ["robots.virtual", "help.examples"]
     window.session.join(pepper())
     panel.refresh()
@@ -307,7 +318,7 @@ def test_python_program_has_syntax_highlighting(qtbot, qapp) -> None:
 
 def test_toolbox_pinned_setting_is_saved(qtbot, panel, window) -> None:
     assert editor(panel).last("set_toolbox_pinned") is None
-    editor(panel).toolbox_pinned.emit(False)
+    send(panel, FlyoutPinned(False))
     assert window.session.settings.toolbox_pinned is False
     again = window.make(PANEL, (1032, 600))
     qtbot.addWidget(again)
@@ -318,7 +329,7 @@ def test_toolbox_pinned_setting_is_saved(qtbot, panel, window) -> None:
 
 @pytest.mark.parametrize(("count", "words"), [(1, "Deleted 1 block"), (4, "Deleted 4 blocks")])
 def test_deleted_blocks_are_restored_from_the_toast(panel, window, count, words) -> None:
-    editor(panel).blocks_deleted.emit(count)
+    send(panel, BlocksDeleted(count))
     button, run = window.toast_buttons[-1]
     assert (window.toasts[-1], button) == (words, "Undo")
     assert run is not None
@@ -348,9 +359,9 @@ def test_block_dropped_on_the_same_tab_or_outside_the_tab_bar_is_not_moved(panel
     tabs = title.tabs
     own = tabs.tabs[window.session.document.key]
     for place in (own.mapToGlobal(own.rect().center()), own.mapToGlobal(QPoint(10, 300))):
-        editor(panel).blocks_dragged_outside.emit(place, window.session.document.key)
+        send(panel, BlocksDraggedOutside(at(place), window.session.document.key))
         assert not own.is_drop_target
-        editor(panel).blocks_dropped_outside.emit(place)
+        send(panel, BlocksDroppedOutside(at(place)))
     assert window.commands == []
     assert editor(panel).count("move_dragged_blocks") == 0
 
@@ -368,14 +379,14 @@ def test_dragging_a_block_to_the_end_of_the_tab_bar_scrolls_to_hidden_tabs(
         return len(asked) < 3
 
     monkeypatch.setattr(title.tabs, "scroll_at", scroll_at)
-    editor(panel).blocks_dragged_outside.emit(place, window.session.document.key)
+    send(panel, BlocksDraggedOutside(at(place), window.session.document.key))
     qtbot.waitUntil(lambda: len(asked) == 3)
     scrolling = panel._block_drag._scroll_timer
     assert asked == [place] * 3
     assert not scrolling.isActive(), "nothing moved: it waits for the mouse"
-    editor(panel).blocks_dragged_outside.emit(place, window.session.document.key)
+    send(panel, BlocksDraggedOutside(at(place), window.session.document.key))
     assert scrolling.isActive()
-    editor(panel).blocks_dragged_outside.emit(None, window.session.document.key)
+    send(panel, BlocksDraggedOutside(None, window.session.document.key))
     assert not scrolling.isActive()
 
 
@@ -392,27 +403,27 @@ def test_tab_under_a_dragged_block_opens_and_the_drag_image_follows(qtbot, panel
     tab = title.tabs.tabs[other.key]
     place = tab.mapToGlobal(tab.rect().center())
     carried = panel._block_drag
-    editor(panel).blocks_dragged_outside.emit(place, home.key)
+    send(panel, BlocksDraggedOutside(at(place), home.key))
     assert tab.is_drop_target
     assert carried._open_timer.isActive()
-    editor(panel).blocks_dragged_outside.emit(place + QPoint(0, 400), home.key)
+    send(panel, BlocksDraggedOutside(at(place + QPoint(0, 400)), home.key))
     assert not carried._open_timer.isActive(), "moved away: it stays closed"
-    editor(panel).blocks_dragged_outside.emit(place, home.key)
+    send(panel, BlocksDraggedOutside(at(place), home.key))
     picture = QPixmap(60, 40)
     picture.fill(QColor("#00ff00"))
     data = QBuffer()
     data.open(QIODevice.OpenModeFlag.WriteOnly)
     picture.save(data, "PNG")
-    editor(panel).drag_picture_rendered.emit(bytes(data.data()), 2.0)
+    send(panel, DragImageRendered(bytes(data.data()), 2.0))
     shown = title.window().findChild(DragImage)
     assert shown is not None
     assert shown.isVisible()
     assert (shown.width(), shown.height()) == (30, 20)
     assert shown.pos() == title.window().mapFromGlobal(place) + POINTER_OFFSET
     qtbot.waitUntil(lambda: window.commands == [ShowTab(other.key)])
-    editor(panel).blocks_dragged_outside.emit(None, home.key)
+    send(panel, BlocksDraggedOutside(None, home.key))
     assert not shown.isVisible()
-    editor(panel).drag_picture_rendered.emit(bytes(data.data()), 2.0)
+    send(panel, DragImageRendered(bytes(data.data()), 2.0))
     assert not shown.isVisible(), "it came too late"
 
 
@@ -428,10 +439,10 @@ def test_block_dropped_on_a_tab_opened_during_the_drag_is_moved_to_that_tab(pane
     for key, times in ((home.key, 0), (other.key, 1)):
         tab = title.tabs.tabs[key]
         place = tab.mapToGlobal(tab.rect().center())
-        editor(panel).blocks_dragged_outside.emit(place, home.key)
+        send(panel, BlocksDraggedOutside(at(place), home.key))
         assert tab.is_drop_target == bool(times)
-        editor(panel).blocks_dragged_outside.emit(None, other.key)
-        editor(panel).blocks_dropped_outside.emit(place)
+        send(panel, BlocksDraggedOutside(None, other.key))
+        send(panel, BlocksDroppedOutside(at(place)))
         assert editor(panel).count("move_dragged_blocks") == times
 
 
@@ -441,11 +452,11 @@ def test_plus_button_is_highlighted_under_a_dragged_block_and_requests_a_new_beh
     title.show()
     tabs = title.tabs
     place = tabs.add.mapToGlobal(tabs.add.rect().center())
-    editor(panel).blocks_dragged_outside.emit(place, window.session.document.key)
+    send(panel, BlocksDraggedOutside(at(place), window.session.document.key))
     assert tabs.add.is_drop_target
-    editor(panel).blocks_dragged_outside.emit(None, window.session.document.key)
+    send(panel, BlocksDraggedOutside(None, window.session.document.key))
     assert not tabs.add.is_drop_target
-    editor(panel).blocks_dropped_outside.emit(place)
+    send(panel, BlocksDroppedOutside(at(place)))
     assert window.commands == ["file.new"]
     assert editor(panel).count("move_dragged_blocks") == 0, "no new one came: the block stays"
 

@@ -2,6 +2,7 @@
 // stores the contents (`app/core/projects/backpack.py`); all behaviours share them.
 import * as Blockly from 'blockly/core';
 import {countBlocks} from './bin';
+import {send} from './channel';
 import {withoutTypeChecks} from './checker';
 import {type CopiedItem, type CopiedBlocks, pasteItems, stateOf, stateOfRun} from './clipboard';
 import {visibleArea} from './free_place';
@@ -9,6 +10,7 @@ import {focusedBlock} from './help';
 import {drawIcon, iconElement} from './icons';
 import {ctrl} from './keys';
 import {ADD_TO_BACKPACK, registerBackpackMenu} from './menu';
+import type {BackpackItem} from './messages';
 import {getSelectedBlocksWith, getSelectedNotesWith, groupIntoStacks} from './selection';
 import {Sheet, disposeSheet, createSheet, sheetOf} from './sheet';
 import {type BlockState, wrapUnknown, wrapWholeStack} from './unknown_blocks';
@@ -21,19 +23,9 @@ const GUTTER = 40;
 const BUTTON_SIZE = 30;
 const RETRY_MS = 60;
 
-/** A stack of blocks in the backpack. */
-export interface BackpackEntry {
-  id: string;
-  at: number;
-  block: BlockState;
-}
-
 type BlockInfo = Blockly.utils.toolbox.BlockInfo;
 
-type BackpackRequest = {do: 'put'; blocks: BlockState[]; count: number; notes: number} | {do: 'remove'; id: string} | {do: 'empty' | 'look'};
-
-let contents: readonly BackpackEntry[] = [];
-let sendRequest: (request: BackpackRequest) => void = () => undefined;
+let contents: readonly BackpackItem[] = [];
 let button: HTMLButtonElement | null = null;
 const backpacks = new Set<Backpack>();
 
@@ -59,7 +51,7 @@ function updateButton(): void {
 }
 
 /** Sets the contents of the backpack, newest first, as reported by the window. */
-export function setBackpackContents(items: readonly BackpackEntry[]): void {
+export function setBackpackContents(items: readonly BackpackItem[]): void {
   contents = items;
   updateButton();
   for (const backpack of backpacks) backpack.refresh();
@@ -83,11 +75,11 @@ export function isInBackpack(block: Blockly.Block): boolean {
 
 export function addToBackpack(copied: CopiedItem | CopiedBlocks): void {
   if (copied.nepStudio === 'note') return;
-  const notes = copied.nepStudio === 'blocks' ? copied.notes?.length ?? 0 : 0;
+  const hasNotes = copied.nepStudio === 'blocks' && Boolean(copied.notes?.length);
   const states = copied.nepStudio === 'blocks' ? copied.states : [copied.state];
   const blocks = states.map(({id: _id, x: _x, y: _y, ...rest}) => rest as BlockState);
   const count = blocks.reduce((sum, block) => sum + countBlocks(block as Blockly.serialization.blocks.State), 0);
-  if (blocks.length) sendRequest({do: 'put', blocks, count, notes});
+  if (blocks.length) send({type: 'backpackAdded', blocks, count, hasNotes});
 }
 
 /** Adds the block and the blocks below it to the backpack, or the whole selection if the block is part of it. */
@@ -99,9 +91,8 @@ function addBlockToBackpack(block: Blockly.BlockSvg): void {
   addToBackpack({nepStudio: 'blocks', states: states.filter((state) => state !== null), notes});
 }
 
-/** Registers the backpack's menu items and shortcut, once per page; `postRequest` sends requests to the window. */
-export function registerBackpack(postRequest: (json: string) => void, getBackpack: () => Backpack): void {
-  sendRequest = (request) => postRequest(JSON.stringify(request));
+/** Registers the backpack's menu items and shortcut, once per page. */
+export function registerBackpack(getBackpack: () => Backpack): void {
   const canAddToBackpack = (block: Blockly.BlockSvg | null | undefined): block is Blockly.BlockSvg =>
     Boolean(block) && !block!.isInFlyout && !block!.isShadow();
   Blockly.ShortcutRegistry.registry.register({
@@ -117,7 +108,7 @@ export function registerBackpack(postRequest: (json: string) => void, getBackpac
   registerBackpackMenu({
     canAdd: canAddToBackpack, add: addBlockToBackpack,
     isInBackpack, remove: (block) => sheetOf(block)?.remove(block.getRootBlock()),
-    count: () => contents.length, open: () => getBackpack().toggle(true), empty: () => sendRequest({do: 'empty'}),
+    count: () => contents.length, open: () => getBackpack().toggle(true), empty: () => send({type: 'backpackEmptied'}),
   });
 }
 
@@ -158,7 +149,7 @@ class BackpackSheet extends Sheet {
     empty.title = t('Empty the backpack');
     empty.setAttribute('aria-label', empty.title);
     empty.append(iconElement('trash-2', 16));
-    empty.onclick = () => sendRequest({do: 'empty'});
+    empty.onclick = () => send({type: 'backpackEmptied'});
     this.header.lastElementChild?.before(empty);
   }
 
@@ -168,7 +159,7 @@ class BackpackSheet extends Sheet {
 
   override remove(block: Blockly.BlockSvg): void {
     const id = this.ids.get(block);
-    if (id !== undefined) sendRequest({do: 'remove', id});
+    if (id !== undefined) send({type: 'backpackRemoved', id});
   }
 
   /** Renders the contents; keeps the scroll position and the focused place. */
@@ -178,7 +169,7 @@ class BackpackSheet extends Sheet {
     const {scrollY} = flyoutWorkspace;
     const names = new Map<string, string>();
     const items = contents.map(({block}) => {
-      const {id: _id, x: _x, y: _y, ...rest} = withLocalVariableIds(structuredClone(block), this.targetWorkspace, names);
+      const {id: _id, x: _x, y: _y, ...rest} = withLocalVariableIds(structuredClone(block) as BlockState, this.targetWorkspace, names);
       return {kind: 'block', ...rest};
     });
     const none = [t('The backpack is empty.'), t('Drag blocks to the backpack button'), t('to use them in other files'),
@@ -268,7 +259,7 @@ export class Backpack {
     this.workspace.hideChaff();
     sheet.renderContents();
     if (byKeyboard) sheet.focusFirst();
-    sendRequest({do: 'look'});
+    send({type: 'backpackOpened'});
   }
 
   /** Re-renders an open sheet after the contents changed, but not during a drag, which may hold one of its blocks. */

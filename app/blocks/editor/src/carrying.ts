@@ -2,41 +2,17 @@
 // behaviour. If it shows that behaviour meanwhile, the drag continues there once the mouse is back on the page.
 import * as Blockly from 'blockly/core';
 import {countBlocks} from './bin';
-import {removeAll} from './carry';
-import {type CopiedItem, type CopiedBlocks, pasteItems, copyOfAll, withUndoGroup, stateOf} from './clipboard';
+import {send} from './channel';
+import {type CopiedItem, type CopiedBlocks, pasteItems, withUndoGroup} from './clipboard';
 import {discardUndoGroup, startDragAt} from './drag';
 import {visibleArea} from './free_place';
+import type {PagePosition} from './messages';
+import {type OutgoingDrag, isOutsideViewport} from './outgoing_drag';
 import {renderPng, createPicture} from './picture';
-import type {Item, Note} from './selection';
+import type {Item} from './selection';
 import type {Tab} from './tab';
 
 type Point = Blockly.utils.Coordinate;
-
-/** Items dragged out of the page. Dropped outside, they return to their original place. */
-export interface OutgoingDrag {
-  copied: CopiedItem | CopiedBlocks;
-  /** Transfer to the other behaviour; blocks from the toolbox are `added`. */
-  how: 'moved' | 'copied' | 'added';
-  /** Top blocks of the dragged stacks; empty for a note. */
-  heads: Blockly.BlockSvg[];
-  place: Point;
-  /** Offset of the mouse from the corner of the first item, in workspace units. */
-  grip: Point;
-  isGone(): boolean;
-  /** Deletes the originals; the stack around them closes. */
-  remove(): void;
-}
-
-export interface CrossTabDragListener {
-  /** Called when items of the behaviour `home` are dragged outside the page; `isOutside` is false when that ends. */
-  carried(x: number, y: number, isOutside: boolean, home: string): void;
-  /** Called with the drag image, a `data:` URL of a PNG with `ratio` image pixels per pixel of the page. */
-  pictured(data: string, ratio: number): void;
-  /** Called when the items are dropped outside the page. */
-  dropped(x: number, y: number): void;
-  /** Called when `count` blocks have arrived from the behaviour `from`; 0 for a note. */
-  brought(count: number, how: string, from: string): void;
-}
 
 interface UndoStep {
   tab: Tab;
@@ -65,45 +41,6 @@ interface VisitingCopy {
 const MAX_PICTURE_WIDTH = 360;
 const MAX_PICTURE_HEIGHT = 240;
 
-export function isOutsideViewport({x, y}: Point): boolean {
-  return x < 0 || y < 0 || x >= window.innerWidth || y >= window.innerHeight;
-}
-
-/** Returns the drag of an item out of the page, or null if the item can't leave the page. */
-export function createOutgoingDrag(item: unknown, isFromToolbox: boolean, isCopy: boolean, mouse: Point): OutgoingDrag | null {
-  const isOne = item instanceof Blockly.BlockSvg || item instanceof Blockly.comments.RenderedWorkspaceComment;
-  const copied = isOne ? stateOf(item, true) : null;
-  if (!isOne || !copied) return null;
-  const block = item instanceof Blockly.BlockSvg ? item : null;
-  const isAlone = !block?.getNextBlock();
-  return {
-    copied,
-    how: isFromToolbox ? 'added' : isCopy || !item.isDeletable() ? 'copied' : 'moved',
-    heads: block ? [block] : [],
-    place: item.getRelativeToSurfaceXY(),
-    grip: Blockly.utils.Coordinate.difference(mouse, item.getRelativeToSurfaceXY()),
-    isGone: () => item.isDeadOrDying(),
-    remove: () => block ? block.dispose(isAlone, false) : item.dispose(),
-  };
-}
-
-/** Returns the drag of selected blocks and notes out of the page. */
-export function createOutgoingGroupDrag(runs: readonly Blockly.BlockSvg[][], notes: readonly Note[], isCopy: boolean, mouse: Point): OutgoingDrag | null {
-  const heads = runs.flatMap(([head]) => head ?? []);
-  const first = heads[0] ?? notes[0];
-  if (!first) return null;
-  const all = [...runs.flat(), ...notes];
-  return {
-    copied: copyOfAll(runs, notes),
-    how: isCopy || !all.every((item) => item.isDeletable()) ? 'copied' : 'moved',
-    heads,
-    place: first.getRelativeToSurfaceXY(),
-    grip: Blockly.utils.Coordinate.difference(mouse, first.getRelativeToSurfaceXY()),
-    isGone: () => all.some((item) => item.isDeadOrDying()),
-    remove: () => removeAll(runs, notes),
-  };
-}
-
 export class CrossTabDrag {
   private mouse: Point | null = null;
   private frame = 0;
@@ -118,7 +55,7 @@ export class CrossTabDrag {
   /** Number of the latest requested drag image. */
   private picture = 0;
 
-  constructor(private readonly window: CrossTabDragListener, private readonly getActiveTab: () => Tab) {}
+  constructor(private readonly getActiveTab: () => Tab) {}
 
   /** Tracks the mouse outside the page and notifies the window at most once per frame; null when it is back inside. */
   trackOutside(mouse: Point | null, items: readonly Item[] = []): void {
@@ -138,7 +75,7 @@ export class CrossTabDrag {
     const {hand} = this;
     if (hand) this.stopHolding();
     this.pendingDrop = hand ? {tab: hand.from, drag: hand.drag} : {tab, drag};
-    this.window.dropped(Math.round(mouse.x), Math.round(mouse.y));
+    send({type: 'blocksDroppedOutside', position: roundPosition(mouse)});
   }
 
   /** Shows another behaviour. Items dragged outside the page return to their place, but the drag continues. */
@@ -163,7 +100,7 @@ export class CrossTabDrag {
     }
     this.steps = [createUndoStep(tab, group, items)];
     if (shouldRemove) this.removeOriginals(drag, from);
-    this.window.brought(countCopiedBlocks(drag.copied), how, from.key);
+    send({type: 'blocksTransferred', count: countCopiedBlocks(drag.copied), mode: how, sourceTab: from.key});
   }
 
   /** Inserts the dropped items into the visible part of `to`, selected; deletes the originals of a move. */
@@ -175,7 +112,7 @@ export class CrossTabDrag {
     this.steps = [];
     if (!this.insertCopy(drag.copied, to)) return;
     if (drag.how === 'moved' && !drag.isGone()) this.removeOriginals(drag, from);
-    this.window.brought(countCopiedBlocks(drag.copied), drag.how, from.key);
+    send({type: 'blocksTransferred', count: countCopiedBlocks(drag.copied), mode: drag.how, sourceTab: from.key});
   }
 
   /** Undoes the last drop in both behaviours, once this frame's edits have been added to the undo stacks. */
@@ -291,8 +228,8 @@ export class CrossTabDrag {
     if (!picture) return;
     const scale = Math.min(workspace.scale, MAX_PICTURE_WIDTH / picture.width, MAX_PICTURE_HEIGHT / picture.height);
     const ratio = window.devicePixelRatio;
-    const data = await renderPng(picture, scale * ratio);
-    if (mine === this.picture && this.mouse) this.window.pictured(data, ratio);
+    const png = await renderPng(picture, scale * ratio);
+    if (mine === this.picture && this.mouse) send({type: 'dragImageRendered', png, ratio});
   }
 
   private notifyPosition(): void {
@@ -300,8 +237,8 @@ export class CrossTabDrag {
     this.frame = 0;
     if (!this.mouse && !this.isReported) return;
     this.isReported = this.mouse !== null;
-    const home = (this.hand?.from ?? this.getActiveTab()).key;
-    this.window.carried(Math.round(this.mouse?.x ?? 0), Math.round(this.mouse?.y ?? 0), this.isReported, home);
+    const tab = (this.hand?.from ?? this.getActiveTab()).key;
+    send({type: 'blocksDraggedOutside', position: this.mouse && roundPosition(this.mouse), tab});
   }
 
   private insertCopy(copied: CopiedItem | CopiedBlocks, tab: Tab): boolean {
@@ -341,6 +278,10 @@ function withEventGroup(group: string, change: () => void): void {
   } finally {
     Blockly.Events.setGroup(before);
   }
+}
+
+function roundPosition({x, y}: Point): PagePosition {
+  return {x: Math.round(x), y: Math.round(y)};
 }
 
 /** Returns the number of blocks, or 0 for a note. */

@@ -1,13 +1,14 @@
 // Copy, cut, paste and duplicate for blocks and notes. Copies are text on the system clipboard, so that they
 // can be pasted in other tabs and instances of Studio, or sent to others. Pasted items are free and in view.
 import * as Blockly from 'blockly/core';
+import {send} from './channel';
 import {withoutTypeChecks} from './checker';
 import {findFreePosition, visibleArea, obstacles} from './free_place';
 import {focusedBlock} from './help';
 import {type Item, type Note, getSelectedItemsWith, getSelectedBlocksWith, getSelectedNotesWith, deleteSelectionWith, groupIntoStacks, selectionOf} from './selection';
 import {type BlockState, unwrapUnknown, wrapUnknown} from './unknown_blocks';
 
-/** Prefix of every copied text; `app/ui/blockly/bridge.py` checks for it. */
+/** Prefix of every copied text; `app/ui/blockly/host.py` checks for it. */
 const JSON_PREFIX = '{"nepStudio":';
 
 export interface CopiedItem {
@@ -24,20 +25,16 @@ export interface CopiedBlocks {
 
 type Point = Blockly.utils.Coordinate;
 
-/** System clipboard, which the page can't read itself. */
-export interface SystemClipboard {
-  write(text: string): void;
-  read(): Promise<string>;
-}
-
 const PASTE_OFFSET = 34;
 
 export class Clipboard {
   /** Last copy made here, pasted if the system clipboard holds anything else. */
   private copied = '';
   private mouse: {x: number; y: number} | null = null;
+  /** Requests for the text of the system clipboard, which the page can't read itself. */
+  private readonly requests: ((text: string) => void)[] = [];
 
-  constructor(private readonly system: SystemClipboard) {
+  constructor() {
     document.addEventListener('pointermove', (event) => this.mouse = {x: event.clientX, y: event.clientY}, true);
     document.documentElement.addEventListener('pointerleave', () => this.mouse = null);
   }
@@ -47,7 +44,7 @@ export class Clipboard {
     const copied = item && copyOf(item);
     if (!copied) return false;
     this.copied = JSON.stringify(copied);
-    this.system.write(this.copied);
+    send({type: 'blocksCopied', text: this.copied});
     return true;
   }
 
@@ -68,10 +65,22 @@ export class Clipboard {
 
   /** Pastes at the given position, or else under the mouse, beside the focused block or in the visible area. */
   async paste(pagePosition: {x: number; y: number} | null = null): Promise<void> {
-    const read = parseClipboard(await this.system.read()) ?? parseClipboard(this.copied);
+    const read = parseClipboard(await this.readSystemClipboard()) ?? parseClipboard(this.copied);
     if (!read) return;
     const workspace = Blockly.common.getMainWorkspace() as Blockly.WorkspaceSvg;
     pasteItems(read, workspace, pagePosition ? toWorkspaceCoordinates(workspace, pagePosition) : this.pastePosition(workspace));
+  }
+
+  /** Handles the reply of the window to the oldest request. */
+  receive(text: string): void {
+    this.requests.shift()?.(text);
+  }
+
+  private readSystemClipboard(): Promise<string> {
+    return new Promise((resolve) => {
+      this.requests.push(resolve);
+      send({type: 'clipboardRequested'});
+    });
   }
 
   private pastePosition(workspace: Blockly.WorkspaceSvg): Point {

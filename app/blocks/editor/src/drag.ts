@@ -2,9 +2,9 @@
 import * as Blockly from 'blockly/core';
 import {highlightBackpack, isOverBackpack, isInBackpack, addToBackpack} from './backpack';
 import {DraggedGroup} from './carry';
+import {type OutgoingDrag, isOutsideViewport, createOutgoingDrag, createOutgoingGroupDrag} from './outgoing_drag';
 import {type Item, getSelectedBlocksWith, isNote, getSelectedNotesWith, groupIntoStacks} from './selection';
 import {sheetOf} from './sheet';
-import {type OutgoingDrag, isOutsideViewport, createOutgoingDrag, createOutgoingGroupDrag} from './carrying';
 
 /** Snap radius in screen pixels; larger for the connection being previewed, so that it is kept a little longer. */
 const SNAP_RADIUS = 28;

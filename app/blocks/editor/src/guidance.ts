@@ -1,7 +1,9 @@
 // Onboarding: the hints on an empty canvas, and a ring around the next block to use.
 import * as Blockly from 'blockly/core';
+import {send} from './channel';
 import {iconElement} from './icons';
 import {formatShortcut} from './keys';
+import type {PointerTarget, SetCanvasHint} from './messages';
 import {isKeyboardLed} from './modality';
 import {t} from './words';
 
@@ -12,19 +14,6 @@ const RELEVANT_EVENTS = new Set<string>([
   Blockly.Events.COMMENT_CREATE, Blockly.Events.COMMENT_DELETE, Blockly.Events.FINISHED_LOADING,
   Blockly.Events.TOOLBOX_ITEM_SELECT,
 ]);
-
-/** State from the window: the label of the "when started" block, and whether there is a robot. */
-export interface EmptyCanvasInfo {
-  first: string;
-  robot: boolean;
-}
-
-/** Block type to point at, with its display name and the hint where to put it. */
-export interface PointerTarget {
-  block: string;
-  name: string;
-  then: string;
-}
 
 function createElement<K extends keyof HTMLElementTagNameMap>(tag: K, className: string, text = ''): HTMLElementTagNameMap[K] {
   const node = document.createElement(tag);
@@ -44,16 +33,15 @@ export class EmptyCanvas {
   private readonly categoryHint = createElement('p', '');
   private readonly byKeys = createElement('p', 'nepBeginKeys');
   private readonly robot: HTMLButtonElement;
-  private begin: EmptyCanvasInfo | null = null;
+  private hint: SetCanvasHint | null = null;
   private frame = 0;
 
-  constructor(private readonly getWorkspace: () => Blockly.WorkspaceSvg, private readonly pointer: BlockPointer,
-    sendCommand: (command: string) => void) {
+  constructor(private readonly getWorkspace: () => Blockly.WorkspaceSvg, private readonly pointer: BlockPointer) {
     const buttons = createElement('div', 'nepBeginButtons');
-    this.robot = this.addButton(buttons, 'bot', t('Use the virtual robot'), () => sendCommand('robot'));
+    this.robot = this.addButton(buttons, 'bot', t('Use the virtual robot'), () => send({type: 'canvasButtonPressed', button: 'robot'}));
     this.robot.classList.add('primary');
     this.addButton(buttons, 'lightbulb', t('Show me'), (event) => this.showFirstBlock(event.detail === 0));
-    this.addButton(buttons, 'blocks', t('Open an example'), () => sendCommand('examples'));
+    this.addButton(buttons, 'blocks', t('Open an example'), () => send({type: 'canvasButtonPressed', button: 'examples'}));
     this.byKeys.textContent = t('With the keyboard: press {toolbox}, choose the block with the arrow keys, press Enter to pick it up and Enter again to place it.',
       {toolbox: formatShortcut(Blockly.ShortcutItems.names.FOCUS_TOOLBOX)});
     this.box.append(this.dropTarget, this.categoryHint, this.byKeys, buttons);
@@ -62,10 +50,10 @@ export class EmptyCanvas {
     window.addEventListener('resize', () => this.scheduleUpdate());
   }
 
-  setInfo(begin: EmptyCanvasInfo): void {
-    this.begin = begin;
-    this.dropTarget.textContent = t('Drag “{block}” here', {block: begin.first});
-    this.robot.hidden = begin.robot;
+  setHint(hint: SetCanvasHint): void {
+    this.hint = hint;
+    this.dropTarget.textContent = t('Drag “{block}” here', {block: hint.blockLabel});
+    this.robot.hidden = hint.hasRobot;
     this.scheduleUpdate();
   }
 
@@ -88,7 +76,7 @@ export class EmptyCanvas {
     const dragged = workspace.isDragging() ? 1 : 0;
     const empty = workspace.getTopBlocks(false).length <= dragged && !workspace.getTopComments().length;
     document.body.classList.toggle('nepEmpty', empty);
-    this.box.hidden = !empty || this.begin === null;
+    this.box.hidden = !empty || this.hint === null;
     if (this.box.hidden) return;
     this.box.classList.toggle('dragging', dragged > 0);
     const flyout = workspace.getFlyout();
@@ -102,7 +90,7 @@ export class EmptyCanvas {
   }
 
   private showFirstBlock(isKeyboardClick: boolean): void {
-    this.pointer.show({block: FIRST_BLOCK_TYPE, name: this.begin?.first ?? '', then: t('Drag it onto the page')});
+    this.pointer.show({block: FIRST_BLOCK_TYPE, name: this.hint?.blockLabel ?? '', placementHint: t('Drag it onto the page')});
     if (isKeyboardClick) this.pointer.focusCategory();
   }
 
@@ -176,9 +164,9 @@ export class BlockPointer {
   }
 
   /** Returns the hint; it mentions keys if the keyboard is in use. */
-  private hintText(isOpen: boolean, {name, then}: PointerTarget, category: string): string {
+  private hintText(isOpen: boolean, {name, placementHint}: PointerTarget, category: string): string {
     const byKeys = isKeyboardLed();
-    if (isOpen) return byKeys ? t('Press Enter to pick it up and Enter again to place it') : then;
+    if (isOpen) return byKeys ? t('Press Enter to pick it up and Enter again to place it') : placementHint;
     const hint = t('You\'ll find “{block}” under {category}', {block: name, category});
     return byKeys ? `${hint} (${formatShortcut(Blockly.ShortcutItems.names.FOCUS_TOOLBOX)})` : hint;
   }

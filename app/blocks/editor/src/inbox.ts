@@ -1,29 +1,31 @@
 // Queue of messages from the window, processed in order. Loading a long behaviour blocks painting for about a
 // second: the canvas is covered first, so that the old blocks aren't shown under the new title.
+import type {WindowMessage} from './messages';
 import {t} from './words';
 
-/** Payload length above which loading can be noticeably slow. */
-const LARGE_PAYLOAD_LENGTH = 12_000;
+/** Length of a message above which loading can be noticeably slow. */
+const LARGE_MESSAGE_LENGTH = 12_000;
 /** Fallback for a hidden page, which is never painted. */
 const HIDDEN_PAGE_TIMEOUT_MS = 100;
 
 export class Inbox {
-  private waiting: [name: string, payload: string][] | null = null;
+  private waiting: WindowMessage[] | null = null;
   private readonly cover = document.createElement('div');
 
-  constructor(private readonly receive: (name: string, payload: string) => void) {
+  constructor(private readonly receive: (message: WindowMessage) => void) {
     this.cover.className = 'nepOpening';
     this.cover.setAttribute('role', 'status');
   }
 
-  dispatch(name: string, payload: string): void {
-    if (this.waiting) this.waiting.push([name, payload]);
-    else if (name === 'tab' && payload.length >= LARGE_PAYLOAD_LENGTH) this.dispatchAfterPaint(name, payload);
-    else this.receive(name, payload);
+  /** Processes a message; `length` is the length of its JSON. */
+  dispatch(message: WindowMessage, length: number): void {
+    if (this.waiting) this.waiting.push(message);
+    else if (message.type === 'showTab' && length >= LARGE_MESSAGE_LENGTH) this.dispatchAfterPaint(message);
+    else this.receive(message);
   }
 
-  private dispatchAfterPaint(name: string, payload: string): void {
-    this.waiting = [[name, payload]];
+  private dispatchAfterPaint(message: WindowMessage): void {
+    this.waiting = [message];
     this.cover.textContent = t('Opening…');
     document.body.append(this.cover);
     let isDone = false;
@@ -33,7 +35,7 @@ export class Inbox {
       const queued = this.waiting ?? [];
       this.waiting = null;
       try {
-        for (const [queuedName, queuedPayload] of queued) this.receive(queuedName, queuedPayload);
+        for (const each of queued) this.receive(each);
       } finally {
         this.cover.remove();
       }

@@ -7,10 +7,11 @@ import './mutators';
 import {setBlocklyMessages} from './blockly_words';
 import './near';
 import './number_field';
-import {type BackpackEntry, backpackButton, registerBackpack, setBackpackContents} from './backpack';
+import {backpackButton, registerBackpack, setBackpackContents} from './backpack';
 import {CrossTabDrag} from './carrying';
+import {type Bridge, connect, rejectUnhandled, send} from './channel';
 import {Clipboard} from './clipboard';
-import {type EmptyCanvasInfo, EmptyCanvas, BlockPointer, type PointerTarget} from './guidance';
+import {EmptyCanvas, BlockPointer} from './guidance';
 import {binButton} from './bin';
 import {selectAll, marqueeButton} from './frame';
 import {HelpCard, focusedBlock, registerHelpMenu} from './help';
@@ -18,47 +19,19 @@ import {Inbox} from './inbox';
 import {iconElement} from './icons';
 import {registerClipboardShortcuts, applyShortcutKeys} from './keys';
 import {registerMenu, registerPictureMenu, configureMenu} from './menu';
+import type {EditSelection, EditorTheme, LayOutPages, RenderPicture, RunCommand, ShowTab, StartEditor, WindowMessage} from './messages';
 import {renderPng, createPicture} from './picture';
-import {type PageSetup as Paper, clearPages, layoutPages} from './print';
+import {clearPages, layoutPages} from './print';
 import {FindBar} from './search';
 import {trackInputModality, setKeyboardLed} from './modality';
 import {type Tab} from './tab';
-import {type Definitions, type ShownTab, Tabs} from './tabs';
+import {type Definitions, Tabs} from './tabs';
 import {setCssVariables} from './theme';
 import {type Tokens, useTokens} from './tokens';
-import {type Alarm, showAlarms} from './toolbox';
-import {type VariableEdit, setCommandHandler, registerVariableMenu} from './variable_edits';
-import type {VariableValue} from './watched_values';
+import {showAlarms} from './toolbox';
+import {registerVariableMenu} from './variable_edits';
 import {TryResult, registerTries} from './tries';
 import {t, setTranslations} from './words';
-
-interface Bridge {
-  command_sent: {connect(slot: (name: string, payload: string) => void): void};
-  initial_settings(): Promise<string>;
-  ready(): void;
-  changed(key: string, generation: number, json: string): void;
-  history(canUndo: boolean, canRedo: boolean): void;
-  selected(id: string): void;
-  flushed(token: number, json: string): void;
-  pictured(token: number, data: string): void;
-  failed(message: string): void;
-  opened(): void;
-  on_block(has: boolean): void;
-  show_sensors(sensors: string): void;
-  copy(text: string): void;
-  copied(): Promise<string>;
-  command(name: string): void;
-  watch_variables(variables: string): void;
-  press_canvas_button(button: string): void;
-  try_stack(stack: string): void;
-  pin(isPinned: boolean): void;
-  deleted(count: number): void;
-  drag_outside(x: number, y: number, isOutside: boolean, tab: string): void;
-  drag_picture(data: string, ratio: number): void;
-  dropped(x: number, y: number): void;
-  transferred(count: number, mode: string, sourceTab: string): void;
-  backpack(json: string): void;
-}
 
 declare const QWebChannel: new (transport: unknown, callback: (channel: {objects: {bridge: Bridge}}) => void) => unknown;
 declare const qt: {webChannelTransport: unknown};
@@ -66,70 +39,57 @@ declare const qt: {webChannelTransport: unknown};
 class Editor {
   private readonly tabs: Tabs;
   private readonly help = new HelpCard();
-  private readonly clipboard: Clipboard;
+  private readonly clipboard = new Clipboard();
   private readonly tryAnswer = new TryResult();
-  private readonly carrying: CrossTabDrag;
+  private readonly carrying = new CrossTabDrag(() => this.activeTab);
   private offered = '[]';
   private watched = '[]';
   private readonly find = new FindBar(() => this.activeTab.workspace);
   private readonly pointer = new BlockPointer(() => this.activeTab.workspace);
-  private readonly empty: EmptyCanvas;
+  private readonly empty = new EmptyCanvas(() => this.activeTab.workspace, this.pointer);
 
-  constructor(private readonly bridge: Bridge, pinned: boolean | null, private theme: {tokens: Tokens; dark: boolean}) {
-    this.empty = new EmptyCanvas(() => this.activeTab.workspace, this.pointer, (button) => bridge.press_canvas_button(button));
-    this.carrying = new CrossTabDrag({
-      carried: (x, y, isOutside, tab) => bridge.drag_outside(x, y, isOutside, tab),
-      pictured: (data, ratio) => bridge.drag_picture(data, ratio),
-      dropped: (x, y) => bridge.dropped(x, y),
-      brought: (count, mode, sourceTab) => bridge.transferred(count, mode, sourceTab),
-    }, () => this.activeTab);
+  constructor(isPinned: boolean | null, private theme: EditorTheme) {
+    const isActive = (tab: Tab) => tab === this.tabs?.activeTab;
     const ifActive = (tab: Tab, notify: () => void) => {
-      if (tab === this.tabs?.activeTab) notify();
+      if (isActive(tab)) notify();
     };
     this.tabs = new Tabs(document.getElementById('workspace')!, {
-      changed: (tab, json) => {
-        bridge.changed(tab.key, tab.generation, json);
-        this.find.refresh();
-      },
-      history: (tab, canUndo, canRedo) => ifActive(tab, () => bridge.history(canUndo, canRedo)),
-      selected: (tab, id) => ifActive(tab, () => bridge.selected(id)),
+      isActive,
+      edited: () => this.find.refresh(),
       offered: (tab) => ifActive(tab, () => this.notifyOfferedSensors()),
       watched: (tab) => ifActive(tab, () => this.notifyWatched()),
       made: (tab) => this.empty.watch(tab.workspace),
       pinned: (isPinned) => {
-        bridge.pin(isPinned);
+        send({type: 'flyoutPinned', isPinned});
         this.tabs.setPinned(isPinned);
       },
-      deleted: (tab, count) => ifActive(tab, () => bridge.deleted(count)),
       binned: (tab) => ifActive(tab, () => this.updateBinButton()),
       outside: (mouse, items) => this.carrying.trackOutside(mouse, items),
       dragEnded: (isPlaced, isCopy) => this.carrying.dragEnded(isPlaced, isCopy),
       droppedOutside: (tab, drag, mouse) => this.carrying.dropOutside(tab, drag, mouse),
     });
-    this.tabs.setPinned(pinned);
+    this.tabs.setPinned(isPinned);
     // Don't resize for printing, which changes the size of the page temporarily.
     new ResizeObserver(() => window.matchMedia('print').matches || this.tabs.resize()).observe(document.body);
     // A hidden page has no animation frames, and Blockly fires events only after a frame.
     document.addEventListener('visibilitychange', () => document.hidden && this.activeTab.program.flush());
     this.createZoomButtons();
-    registerTries((request) => bridge.try_stack(JSON.stringify(request)));
+    registerTries();
     registerHelpMenu((block) => this.help.show(block));
-    this.clipboard = new Clipboard({write: (text) => bridge.copy(text), read: () => bridge.copied()});
     registerClipboardShortcuts(this.clipboard);
     registerMenu(this.clipboard);
-    registerBackpack((json) => bridge.backpack(json), () => this.activeTab.backpack);
-    registerPictureMenu((command) => bridge.command(command));
+    registerBackpack(() => this.activeTab.backpack);
+    registerPictureMenu();
     // Send shortcuts to the canvas if no element has the focus, such as after a tab switch.
     document.addEventListener('keydown', (event) => {
       if (document.activeElement !== document.body || !(event.ctrlKey || event.metaKey)) return;
       Blockly.ShortcutRegistry.registry.onKeyDown(this.activeTab.workspace, event);
     });
-    setCommandHandler((command) => bridge.command(command));
     registerVariableMenu((id) => this.activeTab.watched.isWatched(id));
     let wasOnBlock = false;
     const notifyFocusedBlock = () => queueMicrotask(() => {
-      const has = focusedBlock() !== null;
-      if (has !== wasOnBlock) bridge.on_block(wasOnBlock = has);
+      const isFocused = focusedBlock() !== null;
+      if (isFocused !== wasOnBlock) send({type: 'blockFocusChanged', isFocused: wasOnBlock = isFocused});
     });
     document.addEventListener('focusin', notifyFocusedBlock);
     document.addEventListener('focusout', notifyFocusedBlock);
@@ -141,66 +101,77 @@ class Editor {
     }, true);
   }
 
-  receive(name: string, payload: string): void {
-    const command = this.commands[name];
-    if (!command) throw new Error(`no command ${name}`);
-    command(JSON.parse(payload) as never);
+  receive(message: WindowMessage): void {
+    const {activeTab} = this;
+    switch (message.type) {
+      case 'startEditor': return;  // handled in `start`
+      case 'setTheme': return this.setTheme(message.theme);
+      case 'setReducedMotion': return setReducedMotion(message.isReduced);
+      case 'setDefinitions': return this.tabs.define(message.definitions as Definitions);
+      case 'showTab': return this.showTab(message);
+      case 'closeTab': return this.tabs.close(message.key);
+      case 'pinFlyout': return this.tabs.setPinned(message.isPinned);
+      case 'highlightBlocks': return activeTab.overlays.highlight(message.ids);
+      case 'markStopped': return activeTab.overlays.markStopped(message.ids);
+      case 'setAbsent': return activeTab.overlays.setAbsent(message.ids);
+      case 'setBlockErrors': return this.setErrors(message.errors);
+      case 'setBlockWarnings': return activeTab.overlays.setWarnings(message.warnings);
+      case 'showValue': return this.showMessageBeside(message.id, message.text, false);
+      case 'setVariableValues': return activeTab.watched.updateValues(message.values);
+      case 'setLiveValues': return activeTab.overlays.setLive(message.values, message.staleKeys);
+      case 'setAlarms': return showAlarms(message.alarms);
+      case 'editVariable': return activeTab.editVariable(message.edit);
+      case 'flushWorkspace':
+        return send({type: 'workspaceFlushed', token: message.token, workspace: activeTab.program.flush()});
+      case 'renderPicture': return void this.sendPicture(message);
+      case 'layOutPages': return this.layOutPages(message);
+      case 'applyEdit': return activeTab.change(message.workspace);
+      case 'setBackpack': return setBackpackContents(message.items);
+      case 'clipboardText': return this.clipboard.receive(message.text);
+      case 'zoom': return activeTab.workspace.zoomCenter(message.steps);
+      case 'revealBlock': return activeTab.reveal(message.id);
+      case 'editSelection': return this.editSelection(message.command);
+      case 'setCanvasHint': return this.empty.setHint(message);
+      case 'pointAt': return this.pointer.show(message.target);
+      case 'runCommand': return this.run(message.command);
+      default: return rejectUnhandled(message);
+    }
   }
 
   private get activeTab(): Tab {
     return this.tabs.activeTab;
   }
 
-  private readonly commands: Record<string, (payload: never) => void> = {
-    theme: (theme: {tokens: Tokens; dark: boolean}) => this.setTheme(theme.tokens, theme.dark),
-    motion: (motion: {reduced: boolean}) => document.documentElement.classList.toggle('reduced', motion.reduced),
-    definitions: (definitions: Definitions) => this.tabs.define(definitions),
-    tab: (tab: ShownTab) => this.showTab(tab),
-    pin: (pinned: boolean | null) => this.tabs.setPinned(pinned),
-    close: (key: string) => this.tabs.close(key),
-    highlight: (ids: string[]) => this.activeTab.overlays.highlight(ids),
-    stopped: (ids: string[]) => this.activeTab.overlays.markStopped(ids),
-    errors: (errors: Record<string, string>) => this.setErrors(errors),
-    value: ([id, words]: [string, string]) => this.showMessageBeside(id, words, false),
-    warnings: (warnings: Record<string, string>) => this.activeTab.overlays.setWarnings(warnings),
-    absent: (ids: string[]) => this.activeTab.overlays.setAbsent(ids),
-    values: (values: Record<string, VariableValue>) => this.activeTab.watched.updateValues(values),
-    variable: (edit: VariableEdit) => this.activeTab.editVariable(edit),
-    alarms: (alarms: Record<string, Alarm>) => showAlarms(alarms),
-    live: (state: {values: Record<string, string>; old: string[]}) => this.activeTab.overlays.setLive(state.values, state.old),
-    flush: (token: number) => this.bridge.flushed(token, this.activeTab.program.flush()),
-    picture: (request: PictureRequest) => void this.sendPicture(request),
-    pages: (request: Paper & {token: number}) => this.preparePrint(request),
-    printed: () => clearPages(),
-    change: (state: Record<string, unknown>) => this.activeTab.change(state),
-    undo: () => this.activeTab.program.undo(false),
-    bring: () => this.carrying.dropInto(this.activeTab),
-    giveBack: () => this.carrying.undoDrop(),
-    backpack: (items: BackpackEntry[]) => setBackpackContents(items),
-    undelete: () => this.activeTab.bin.undoLast() && this.activeTab.program.undo(false),
-    redo: () => this.activeTab.program.undo(true),
-    zoom: (steps: number) => this.activeTab.workspace.zoomCenter(steps),
-    fit: () => this.activeTab.fit(),
-    show: (id: string) => this.activeTab.reveal(id),
-    help: () => this.help.show(focusedBlock()),
-    find: () => {
-      this.find.open();
-      this.bridge.opened();
-    },
-    keyboard: () => setKeyboardLed(true),
-    search: () => {
-      this.activeTab.search();
-      this.bridge.opened();
-    },
-    edit: (action: 'copy' | 'cut' | 'paste' | 'duplicate' | 'selectAll') => {
-      // The command can arrive before the page gets the focus; until then, Blockly has no selected block.
-      if (!this.activeTab.hasFocus || !Blockly.getFocusManager().getFocusedNode()) this.activeTab.focus();
-      if (action === 'selectAll') selectAll(this.activeTab.workspace);
-      else void this.clipboard[action]();
-    },
-    begin: (info: EmptyCanvasInfo | null) => info && this.empty.setInfo(info),
-    point: (target: PointerTarget | null) => this.pointer.show(target),
-  };
+  private run(command: RunCommand['command']): void {
+    const {activeTab} = this;
+    switch (command) {
+      case 'undo': return activeTab.program.undo(false);
+      case 'redo': return activeTab.program.undo(true);
+      case 'undoDeletion':
+        if (activeTab.bin.undoLast()) activeTab.program.undo(false);
+        return;
+      case 'dropBlocks': return this.carrying.dropInto(activeTab);
+      case 'undoDrop': return this.carrying.undoDrop();
+      case 'fit': return activeTab.fit();
+      case 'help': return void this.help.show(focusedBlock());
+      case 'showFocus': return setKeyboardLed(true);
+      case 'clearPages': return clearPages();
+      case 'find':
+        this.find.open();
+        return send({type: 'fieldOpened'});
+      case 'search':
+        activeTab.search();
+        return send({type: 'fieldOpened'});
+      default: return rejectUnhandled(command);
+    }
+  }
+
+  private editSelection(command: EditSelection['command']): void {
+    // The command can arrive before the page gets the focus; until then, Blockly has no selected block.
+    if (!this.activeTab.hasFocus || !Blockly.getFocusManager().getFocusedNode()) this.activeTab.focus();
+    if (command === 'selectAll') selectAll(this.activeTab.workspace);
+    else void this.clipboard[command]();
+  }
 
   /** Shows errors on their blocks, also on a block of the toolbox that was tried. */
   private setErrors(errors: Record<string, string>): void {
@@ -216,7 +187,7 @@ class Editor {
     if (block instanceof Blockly.BlockSvg) this.tryAnswer.show(block, text, isError);
   }
 
-  private showTab(tab: ShownTab): void {
+  private showTab(tab: ShowTab): void {
     this.help.close();
     this.carrying.switchTab(() => this.tabs.show(tab));
     this.find.refresh();
@@ -228,52 +199,55 @@ class Editor {
 
   /** Requests the values of the watched variables from the window. */
   private notifyWatched(): void {
-    const watched = JSON.stringify(this.activeTab.watched.ids);
-    if (watched !== this.watched) this.bridge.watch_variables(this.watched = watched);
+    const {ids} = this.activeTab.watched;
+    const watched = JSON.stringify(ids);
+    if (watched === this.watched) return;
+    this.watched = watched;
+    send({type: 'variablesWatched', ids});
   }
 
   /** Requests the values of the sensors shown in the toolbox from the window. */
   private notifyOfferedSensors(): void {
-    const offered = JSON.stringify(this.activeTab.offered);
-    if (offered !== this.offered) this.bridge.show_sensors(this.offered = offered);
+    const sensors = this.activeTab.offered;
+    const offered = JSON.stringify(sensors);
+    if (offered === this.offered) return;
+    this.offered = offered;
+    send({type: 'sensorsShown', sensors});
   }
 
   /** Runs `draw` with the light theme. */
   private withLightTheme<T>(draw: () => T): T {
-    const {tokens, dark} = this.theme;
-    if (dark) this.setTheme(tokens, false);  // never visible: the theme is restored before the next paint
+    const {theme} = this;
+    if (theme.isDark) this.setTheme({...theme, isDark: false});  // never visible: the theme is restored before the next paint
     try {
       return draw();
     } finally {
-      if (dark) this.setTheme(tokens, true);
+      if (theme.isDark) this.setTheme(theme);
     }
   }
 
-  /** Lays out the pages to print and reports their number to the window; "" if there are no blocks. */
-  private preparePrint({token, ...paper}: Paper & {token: number}): void {
+  private layOutPages(paper: LayOutPages): void {
     let count = 0;
     try {
       count = this.withLightTheme(() => layoutPages(this.activeTab.workspace, paper));
     } finally {
-      this.bridge.pictured(token, count ? `${count}` : '');
+      send({type: 'pagesLaidOut', token: paper.token, count});
     }
   }
 
-  /** Sends a picture of the blocks to the window; "" if there are no blocks. */
-  private async sendPicture({token, kind, white}: PictureRequest): Promise<void> {
+  private async sendPicture({token, kind, isWhite}: RenderPicture): Promise<void> {
     let data = '';
     try {
-      const picture = await this.withLightTheme(() => createPicture(this.activeTab.workspace, white));
+      const picture = await this.withLightTheme(() => createPicture(this.activeTab.workspace, isWhite));
       if (picture) data = kind === 'svg' ? picture.svg : await renderPng(picture);
     } finally {
-      this.bridge.pictured(token, data);
+      send(kind === 'svg' ? {type: 'svgRendered', token, svg: data} : {type: 'pngRendered', token, png: data});
     }
   }
 
-  private setTheme(tokens: Tokens, dark: boolean): void {
-    this.theme = {tokens, dark};
-    useTokens(tokens, dark);
-    setCssVariables(dark);
+  private setTheme(theme: EditorTheme): void {
+    this.theme = theme;
+    applyTheme(theme);
     this.tabs.themeChanged();
   }
 
@@ -313,18 +287,13 @@ class Editor {
   }
 }
 
-interface PictureRequest {
-  token: number;
-  kind: 'png' | 'svg';
-  white: boolean;
+function applyTheme({tokens, isDark}: EditorTheme): void {
+  useTokens(tokens as unknown as Tokens, isDark);
+  setCssVariables(isDark);
 }
 
-interface InitialState {
-  language: string;
-  words: Record<string, string>;
-  reduced: boolean;
-  pinned: boolean | null;
-  theme: {tokens: Tokens; dark: boolean};
+function setReducedMotion(isReduced: boolean): void {
+  document.documentElement.classList.toggle('reduced', isReduced);
 }
 
 /** Loads Blockly's messages in this language, otherwise in English; returns the language that was loaded. */
@@ -339,12 +308,10 @@ async function loadLocale(requested: string): Promise<string> {
   throw new Error('no message catalogue of Blockly');
 }
 
-async function start(bridge: Bridge): Promise<void> {
-  const initial = JSON.parse(await bridge.initial_settings()) as InitialState;
-  useTokens(initial.theme.tokens, initial.theme.dark);
-  setCssVariables(initial.theme.dark);
-  document.documentElement.classList.toggle('reduced', initial.reduced);
-  setTranslations(initial.words ?? {});
+async function createEditor(initial: StartEditor): Promise<Editor> {
+  applyTheme(initial.theme);
+  setReducedMotion(initial.isMotionReduced);
+  setTranslations(initial.words);
   const language = await loadLocale(initial.language);
   setBlocklyMessages(language);
   configureMenu();
@@ -352,19 +319,34 @@ async function start(bridge: Bridge): Promise<void> {
   // Load the fonts first, because Blockly caches the width of text.
   const fonts = ['600 15px Inter', '500 14px Inter', ...(language === 'ja' ? ['600 15px "M PLUS 1p"'] : [])];
   await Promise.allSettled(fonts.map((font) => document.fonts.load(font)));
-  const editor = new Editor(bridge, initial.pinned, initial.theme);
+  const editor = new Editor(initial.isPinned, initial.theme);
   trackInputModality();
-  const inbox = new Inbox((name, payload) => {
+  return editor;
+}
+
+async function start(bridge: Bridge): Promise<void> {
+  let receiveFirst: (message: WindowMessage) => void = () => undefined;
+  const first = new Promise<WindowMessage>((resolve) => receiveFirst = resolve);
+  let inbox: Inbox | null = null;
+  connect(bridge, (json) => {
+    const message = JSON.parse(json) as WindowMessage;
+    if (inbox) inbox.dispatch(message, json.length);
+    else receiveFirst(message);
+  });
+  send({type: 'pageOpened'});
+  const message = await first;
+  if (message.type !== 'startEditor') throw new Error(`expected startEditor, not ${message.type}`);
+  const editor = await createEditor(message);
+  inbox = new Inbox((received) => {
     try {
-      editor.receive(name, payload);
+      editor.receive(received);
     } catch (error) {
-      bridge.failed(`${name}: ${error instanceof Error ? error.message : String(error)}`);
+      send({type: 'pageFailed', text: `${received.type}: ${error instanceof Error ? error.message : String(error)}`});
     }
   });
-  bridge.command_sent.connect((name, payload) => inbox.dispatch(name, payload));
-  window.addEventListener('error', (event) => bridge.failed(event.message));
-  window.addEventListener('unhandledrejection', (event) => bridge.failed(String(event.reason)));
-  bridge.ready();
+  window.addEventListener('error', (event) => send({type: 'pageFailed', text: event.message}));
+  window.addEventListener('unhandledrejection', (event) => send({type: 'pageFailed', text: String(event.reason)}));
+  send({type: 'pageReady'});
 }
 
 new QWebChannel(qt.webChannelTransport, (channel) => void start(channel.objects.bridge));

@@ -3,6 +3,7 @@
 // copy and paste, 50 to 79 state, 80 to 89 parts, 90 help, 99 delete; on the canvas, 70 and above are free.
 import * as Blockly from 'blockly/core';
 import {canHaveBreakpoint, hasBreakpoint, toggleBreakpoint} from './breakpoints';
+import {send} from './channel';
 import {type Clipboard} from './clipboard';
 import {focusedBlock} from './help';
 import {canCollapse, setCollapsed} from './folding';
@@ -193,7 +194,8 @@ export function registerBackpackMenu(backpack: BackpackActions): void {
     when: () => backpack.count() > 0, run: () => backpack.empty()});
 }
 
-export function registerPictureMenu(command: (name: string) => void): void {
+export function registerPictureMenu(): void {
+  const command = (name: string) => send({type: 'commandRequested', command: name});
   const canvas = (entry: Omit<MenuEntry, 'when'>) => addMenuEntry(ScopeType.WORKSPACE,
     {...entry, when: ({workspace}) => (workspace?.getTopBlocks(false).length ?? 0) > 0});
   addSeparator(ScopeType.WORKSPACE, 60);

@@ -12,7 +12,7 @@ const FRAME_INTERVAL_MS = 66;
 
 export class Overlays {
   private running = new Set<string>();
-  private next: string[] = [];
+  private next: readonly string[] = [];
   private throttleTimer = 0;
   private stopped = new Set<string>();
   private errors = new Map<string, string>();
@@ -29,7 +29,7 @@ export class Overlays {
   }
 
   /** Highlights the running blocks: at once, then throttled, because each update repaints the whole page. */
-  highlight(ids: string[]): void {
+  highlight(ids: readonly string[]): void {
     this.next = ids;
     if (this.throttleTimer) return;
     this.running = new Set(ids);
@@ -41,7 +41,7 @@ export class Overlays {
     }, FRAME_INTERVAL_MS);
   }
 
-  markStopped(ids: string[]): void {
+  markStopped(ids: readonly string[]): void {
     this.stopped = new Set(ids);
     this.updateOutlines();
   }
@@ -59,13 +59,13 @@ export class Overlays {
     this.updateBubbles();
   }
 
-  setAbsent(ids: string[]): void {
+  setAbsent(ids: readonly string[]): void {
     this.absent = new Set(ids);
     this.updateAbsentBlocks();
   }
 
   /** Sets live values by block id, or by `<robot>/<property>[/<field>]` for all blocks that read this sensor. */
-  setLive(values: Record<string, string>, old: string[]): void {
+  setLive(values: Record<string, string>, old: readonly string[]): void {
     this.live = new Map(Object.entries(values));
     this.old = new Set(old);
     this.renderLiveValues();

@@ -99,7 +99,8 @@ export async function renderPng({svg, width, height}: Picture, requestedScale = 
   const canvas = document.createElement('canvas');
   [canvas.width, canvas.height] = [Math.round(width * scale), Math.round(height * scale)];
   canvas.getContext('2d')!.drawImage(image, 0, 0, canvas.width, canvas.height);
-  return canvas.toDataURL('image/png');
+  const url = canvas.toDataURL('image/png');
+  return url.slice(url.indexOf(',') + 1);
 }
 
 /** Returns a copy with inline styles, or null if the element isn't visible. */

@@ -1,6 +1,7 @@
 // Print layout of the blocks: stacks in reading order and in columns, split between two blocks if they don't
 // fit on a page. The pages are part of the editor's page and visible to the printer only.
 import * as Blockly from 'blockly/core';
+import type {LayOutPages} from './messages';
 import {truncateNote, renderItems, expandNote, overflowHeight} from './picture';
 import {t} from './words';
 
@@ -19,15 +20,6 @@ const MIN_COLUMN_FRACTION = 0.4;
 const ROUNDING_TOLERANCE = 0.01;
 
 type Box = Blockly.utils.Rect;
-
-export interface PageSetup {
-  title: string;
-  date: string;
-  /** Size and margin of a sheet in CSS pixels (96 per inch). */
-  width: number;
-  height: number;
-  edge: number;
-}
 
 /** Stack with its notes. */
 interface Cluster {
@@ -51,12 +43,12 @@ interface Piece {
 let pages: HTMLElement | null = null;
 
 /** Lays out the pages for the printer and returns their number; call with the light theme active. */
-export function layoutPages(workspace: Blockly.WorkspaceSvg, setup: PageSetup): number {
+export function layoutPages(workspace: Blockly.WorkspaceSvg, setup: LayOutPages): number {
   clearPages();
   const patterns = new Map<string, SVGElement>();
   const clusters = clustersOf(workspace, patterns);
   if (!clusters.length) return 0;
-  const pieces = layoutClusters(clusters, setup.width - 2 * setup.edge, setup.height - 2 * setup.edge - HEADER_HEIGHT);
+  const pieces = layoutClusters(clusters, setup.width - 2 * setup.margin, setup.height - 2 * setup.margin - HEADER_HEIGHT);
   const count = Math.max(...pieces.map(({page}) => page)) + 1;
   pages = document.createElement('div');
   pages.className = 'nepPrint';
@@ -144,10 +136,10 @@ function layoutClusters(clusters: readonly Cluster[], width: number, height: num
   return pieces;
 }
 
-function createPage({title, date, width, height, edge}: PageSetup, page: number, count: number, pieces: Piece[]): HTMLElement {
+function createPage({title, date, width, height, margin}: LayOutPages, page: number, count: number, pieces: Piece[]): HTMLElement {
   const section = document.createElement('section');
   // Slightly smaller than the sheet, because rounding up would start another page.
-  Object.assign(section.style, {width: `${width}px`, height: `${height - 1}px`, padding: `${edge}px`});
+  Object.assign(section.style, {width: `${width}px`, height: `${height - 1}px`, padding: `${margin}px`});
   const header = document.createElement('header');
   const [name, about] = [document.createElement('b'), document.createElement('span')];
   name.textContent = title;
@@ -155,16 +147,16 @@ function createPage({title, date, width, height, edge}: PageSetup, page: number,
   about.textContent = `${date} · ${pageLabel}`;
   header.append(name, about);
   section.append(header);
-  for (const piece of pieces) section.append(createPiece(piece, edge));
+  for (const piece of pieces) section.append(createPiece(piece, margin));
   return section;
 }
 
-function createPiece({cluster: {box, drawn}, x, y, scale, from, to}: Piece, edge: number): SVGElement {
+function createPiece({cluster: {box, drawn}, x, y, scale, from, to}: Piece, margin: number): SVGElement {
   const svg = document.createElementNS(SVG_NS, 'svg');
   const [wide, high] = [box.getWidth() + LEFT_MARGIN + MARGIN, to - from];
   const attributes = {width: wide * scale, height: high * scale, viewBox: `${box.left - LEFT_MARGIN} ${from} ${wide} ${high}`};
   for (const [name, value] of Object.entries(attributes)) svg.setAttribute(name, `${value}`);
-  Object.assign(svg.style, {left: `${edge + x}px`, top: `${edge + HEADER_HEIGHT + y}px`});
+  Object.assign(svg.style, {left: `${margin + x}px`, top: `${margin + HEADER_HEIGHT + y}px`});
   for (const element of drawn) svg.append(prefixPatternIds(element.cloneNode(true) as SVGElement));
   return svg;
 }

@@ -1,6 +1,7 @@
 // Loads and saves the workspace as JSON and notifies the window of edits.
 import * as Blockly from 'blockly/core';
 import {withoutTypeChecks} from './checker';
+import {send} from './channel';
 import type {Culling} from './culling';
 import {findFreePosition, separateColumns, visibleArea, obstacles} from './free_place';
 import {type BlockState, UNKNOWN_BLOCK, wrapUnknown, wrapWholeStack, unwrapUnknown} from './unknown_blocks';
@@ -10,10 +11,11 @@ import {withDeferredAria} from './blockly_patches';
 
 type Json = Record<string, unknown>;
 
-export interface Listener {
-  changed(json: string): void;
-  history(canUndo: boolean, canRedo: boolean): void;
-  selected(id: string): void;
+/** Tab of a program. */
+export interface ProgramTab {
+  readonly key: string;
+  readonly generation: number;
+  readonly isActive: boolean;
 }
 
 const DEBOUNCE_MS = 150;
@@ -33,7 +35,7 @@ export class Program {
   private readonly nameless: NamelessVariables;
 
   constructor(private readonly workspace: Blockly.WorkspaceSvg, private readonly culling: Culling,
-    private readonly listener: Listener) {
+    private readonly tab: ProgramTab, private readonly onSent: () => void) {
     this.nameless = new NamelessVariables(workspace);
     workspace.addChangeListener((event) => this.onEvent(event));
   }
@@ -125,7 +127,9 @@ export class Program {
     const json = JSON.stringify(this.save());
     if (json !== this.lastNotifiedJson) {
       this.lastNotifiedJson = json;
-      this.listener.changed(json);
+      const {key, generation} = this.tab;
+      send({type: 'workspaceEdited', key, generation, workspace: json});
+      this.onSent();
     }
     return json;
   }
@@ -207,9 +211,6 @@ export class Program {
   }
 
   private onEvent(event: Blockly.Events.Abstract): void {
-    if (event.type === Blockly.Events.SELECTED) {
-      this.listener.selected((event as Blockly.Events.Selected).newElementId ?? '');
-    }
     if (event.isUiEvent || this.isLoading || event.type === Blockly.Events.FINISHED_LOADING) return;
     if (event.type === Blockly.Events.BLOCK_DELETE) this.dropEmptyUndoGroup(event.group);
     this.notifyHistory();
@@ -241,7 +242,7 @@ export class Program {
     const canRedo = this.workspace.getRedoStack().length > 0;
     if (`${canUndo} ${canRedo}` === this.lastNotifiedHistory && !force) return;
     this.lastNotifiedHistory = `${canUndo} ${canRedo}`;
-    this.listener.history(canUndo, canRedo);
+    if (this.tab.isActive) send({type: 'historyChanged', canUndo, canRedo});
   }
 }
 

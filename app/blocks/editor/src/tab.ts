@@ -2,7 +2,7 @@
 import * as Blockly from 'blockly/core';
 import {Backpack} from './backpack';
 import {Bin} from './bin';
-import type {OutgoingDrag} from './carrying';
+import {send} from './channel';
 import {CHECKER} from './checker';
 import {FieldChoice} from './choices';
 import {Culling} from './culling';
@@ -15,21 +15,23 @@ import {RejectedDrops} from './wrong_drop';
 import {Variables} from './variables';
 import {visibleSensors, observeFlyout} from './visible_sensors';
 import {registerInsideMarks} from './inside_marks';
+import type {VariableEdit} from './messages';
 import {keepNotesReadable} from './notes';
+import type {OutgoingDrag} from './outgoing_drag';
 import {Program, hasBlockOfTypes} from './program';
 import {RENDERER} from './renderer';
 import {type Item, Selection} from './selection';
 import {Overlays} from './overlays';
 import {makeTheme} from './theme';
 import {Toolbox} from './toolbox';
-import {type VariableEdit, editVariable, registerVariableButtons} from './variable_edits';
+import {editVariable, registerVariableButtons} from './variable_edits';
 import {WatchedValues} from './watched_values';
 import {TryHandle} from './tries';
 
 export interface TabListener {
-  changed(tab: Tab, json: string): void;
-  history(tab: Tab, canUndo: boolean, canRedo: boolean): void;
-  selected(tab: Tab, id: string): void;
+  isActive(tab: Tab): boolean;
+  /** An edit of the blocks was sent to the window. */
+  edited(): void;
   /** The set of watched variables has changed. */
   watched(tab: Tab): void;
   /** A workspace was created. */
@@ -38,8 +40,6 @@ export interface TabListener {
   offered(tab: Tab): void;
   /** The user has pinned or unpinned the flyout. */
   pinned(isPinned: boolean): void;
-  /** The user has deleted `count` blocks in one step. */
-  deleted(tab: Tab, count: number): void;
   /** The number of deletions in the bin has changed. */
   binned(tab: Tab): void;
   /** The dragged items are outside the page at this position; null: they are inside again. */
@@ -70,7 +70,7 @@ export class Tab {
   private areChoicesOutdated = false;
   private isThemeOutdated = false;
 
-  constructor(container: HTMLElement, listener: TabListener) {
+  constructor(container: HTMLElement, private readonly listener: TabListener) {
     this.frame.className = 'nepTab';
     container.append(this.frame);
     this.workspace = Blockly.inject(this.frame, {
@@ -84,11 +84,7 @@ export class Tab {
       zoom: {controls: false, wheel: true, pinch: true, startScale: DEFAULT_SCALE, minScale: 0.3, maxScale: 2},
     });
     this.culling = new Culling(this.workspace);
-    this.program = new Program(this.workspace, this.culling, {
-      changed: (json) => listener.changed(this, json),
-      history: (canUndo, canRedo) => listener.history(this, canUndo, canRedo),
-      selected: (id) => listener.selected(this, id),
-    });
+    this.program = new Program(this.workspace, this.culling, this, () => listener.edited());
     this.overlays = new Overlays(this.workspace);
     this.functions = new Functions(this.workspace);
     collapseOnDoubleClick(this.workspace);
@@ -97,7 +93,7 @@ export class Tab {
     registerInsideMarks(this.workspace);
     new TryHandle(this.workspace);
     this.variables = new Variables(this.workspace);
-    this.bin = new Bin(this.workspace, {deleted: (count) => listener.deleted(this, count), changed: () => listener.binned(this)});
+    this.bin = new Bin(this.workspace, {deleted: (count) => this.isActive && send({type: 'blocksDeleted', count}), changed: () => listener.binned(this)});
     this.backpack = new Backpack(this.workspace);
     this.rejectedDrops = new RejectedDrops(this.workspace);
     setDragListener(this.workspace, {
@@ -187,6 +183,11 @@ export class Tab {
   cancelInteraction(): void {
     this.workspace.hideChaff();
     this.workspace.getGesture(new PointerEvent('pointercancel'))?.cancel();
+  }
+
+  /** True if this is the visible tab. */
+  get isActive(): boolean {
+    return this.listener.isActive(this);
   }
 
   get hasFocus(): boolean {

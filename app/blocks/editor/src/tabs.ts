@@ -3,6 +3,7 @@ import * as Blockly from 'blockly/core';
 import {type BlockDefinition, defineBlocks, defineSources} from './definitions';
 import {type Option} from './choices';
 import {type BlockHelp, setHelp} from './help';
+import type {ShowTab} from './messages';
 import {Tab, type TabListener} from './tab';
 
 const BUSY_POLL_MS = 60;
@@ -15,13 +16,6 @@ export interface Definitions {
   topics?: string[];
   help?: Record<string, BlockHelp>;
   sources?: Record<string, Option[]>;
-}
-
-export interface ShownTab {
-  key: string;
-  /** If set, `workspace` is loaded into the tab; otherwise the tab is shown as it is. */
-  generation?: number;
-  workspace?: Record<string, unknown>;
 }
 
 export class Tabs {
@@ -37,13 +31,13 @@ export class Tabs {
     this.activeTab = this.createTab();
   }
 
-  show({key, generation, workspace}: ShownTab): void {
+  show({key, content}: ShowTab): void {
     this.applyPending();
     const tab = this.tabs.get(key) ?? this.getUnusedTab() ?? this.createTab();
     tab.key = key;
     this.tabs.set(key, tab);
     this.activate(tab);
-    if (generation !== undefined) tab.load(generation, workspace ?? {});
+    if (content) tab.load(content.generation, content.workspace);
   }
 
   close(key: string): void {

@@ -3,6 +3,7 @@ import * as Blockly from 'blockly/core';
 import {Flyout} from './flyout';
 import {focusedBlock} from './help';
 import {iconElement, iconName} from './icons';
+import type {RobotAlarm} from './messages';
 import {SEARCH, SearchItem} from './search_item';
 import {t} from './words';
 
@@ -38,17 +39,11 @@ function connectionNote(def: Def): string {
   return def['virtual'] === true ? t('virtual') : '';
 }
 
-/** Alarm of a robot: a status of the design, which sets the colour of the dot, and its text. */
-export interface Alarm {
-  status: string;
-  words: string;
-}
-
-let alarms = new Map<string, Alarm>();
+let alarms = new Map<string, RobotAlarm>();
 const headings = new Set<Heading>();
 
 /** Shows the alarms in the robots' headings immediately, even during a drag: a stale green dot would mislead. */
-export function showAlarms(now: Record<string, Alarm>): void {
+export function showAlarms(now: Record<string, RobotAlarm>): void {
   alarms = new Map(Object.entries(now));
   for (const heading of headings) heading.updateStatus();
 }
@@ -83,7 +78,7 @@ class Heading extends Blockly.ToolboxItem {
     const alarm = typeof def['connected'] === 'boolean' ? alarms.get(toText(def['name'])) : undefined;
     this.dot.className = alarm?.status ?? (def['connected'] ? 'on' : 'off');
     this.note.className = alarm?.status ?? '';
-    this.note.textContent = alarm?.words ?? (toText(def['note']) || connectionNote(def));
+    this.note.textContent = alarm?.text ?? (toText(def['note']) || connectionNote(def));
   }
 
   override getDiv(): Element | null {

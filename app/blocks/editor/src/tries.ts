@@ -1,5 +1,6 @@
 // Runs single blocks, as in Scratch: a click on a block of the toolbox, or “Run from here” in the workspace.
 import * as Blockly from 'blockly/core';
+import {send} from './channel';
 import {focusedBlock} from './help';
 import {drawIcon} from './icons';
 import {ctrl} from './keys';
@@ -11,16 +12,6 @@ const SVG_NS = 'http://www.w3.org/2000/svg';
 const MENU_ITEM_ID = 'nepRunFromHere';
 const HANDLE_DISTANCE = 34;
 const HANDLE_SIZE = 26;
-
-/** Block to run: a workspace block by its id, a toolbox block with its serialized state. */
-export interface TryRequest {
-  id: string;
-  kind: 'value' | 'hat' | 'stack';
-  state?: Blockly.serialization.blocks.State;
-}
-
-type TryListener = (request: TryRequest) => void;
-let notifyTry: TryListener = () => undefined;
 
 /** Returns the block itself, or the nearest parent that isn't a shadow block. */
 function getNonShadowBlock(block: Blockly.Block | null): Blockly.BlockSvg | null {
@@ -37,20 +28,19 @@ function canTry(block: Blockly.BlockSvg | null): block is Blockly.BlockSvg {
 function tryBlock(block: Blockly.BlockSvg): void {
   const kind = block.outputConnection ? 'value' : block.previousConnection ? 'stack' : 'hat';
   if (!block.isInFlyout) {
-    notifyTry({id: block.id, kind});
+    send({type: 'stackTried', id: block.id, kind, state: null});
     return;
   }
   const state = Blockly.serialization.blocks.save(block, {addNextBlocks: true, doFullSerialization: true, saveIds: true});
-  if (state) notifyTry({id: block.id, kind, state});
+  if (state) send({type: 'stackTried', id: block.id, kind, state: {...state}});
 }
 
 function actionLabel(block: Blockly.BlockSvg | null): string {
   return block?.outputConnection ? t('Show value') : t('Run from here');
 }
 
-/** Registers the menu entry, shortcut and toolbox click, once per page; `listener` is called with each request. */
-export function registerTries(listener: TryListener): void {
-  notifyTry = listener;
+/** Registers the menu entry, shortcut and toolbox click, once per page. */
+export function registerTries(): void {
   setMenuIcon(MENU_ITEM_ID, 'play');
   Blockly.ContextMenuRegistry.registry.register({
     id: MENU_ITEM_ID,

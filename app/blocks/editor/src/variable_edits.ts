@@ -1,27 +1,19 @@
 // Creates, renames and deletes variables; the window shows the dialogs and sends the edits to the page.
 import * as Blockly from 'blockly/core';
+import {send} from './channel';
+import type {VariableEdit} from './messages';
 import {t} from './words';
 
 export type Variable = Blockly.IVariableModel<Blockly.IVariableState>;
 
-/** Edit of a variable requested by the window. */
-export interface VariableEdit {
-  do: 'new' | 'rename' | 'delete' | 'watch';
-  id?: string;
-  name?: string;
-  list?: boolean;
-}
-
 const NEW_VARIABLE_ID = 'NEP_NEW_VARIABLE';
 
-/** Runs a command of the window by its name. */
-let runCommand: (command: string) => void = () => undefined;
 /** Drop-down in which “New variable” was chosen; it is set to the created variable. */
 let pendingField: Blockly.FieldVariable | null = null;
 
-/** Sets the function that runs the window's commands for variables. */
-export function setCommandHandler(run: (command: string) => void): void {
-  runCommand = run;
+/** Runs a command of the window for variables. */
+function runCommand(command: string): void {
+  send({type: 'commandRequested', command});
 }
 
 export function registerVariableButtons(workspace: Blockly.WorkspaceSvg): void {
@@ -36,7 +28,7 @@ export function registerVariableButtons(workspace: Blockly.WorkspaceSvg): void {
 /** Applies an edit as one undo step; returns the variable, or null if there is none. */
 export function editVariable(workspace: Blockly.WorkspaceSvg, edit: VariableEdit): Variable | null {
   const variables = workspace.getVariableMap();
-  const variable = edit.id === undefined ? null : variables.getVariableById(edit.id);
+  const variable = variables.getVariableById(edit.id);
   const group = Blockly.Events.getGroup();
   Blockly.Events.setGroup(true);
   try {

@@ -1,19 +1,12 @@
 // Cards at the edge of the page that show the values of variables; movable, and saved with the behaviour.
 import * as Blockly from 'blockly/core';
 import {iconElement} from './icons';
+import type {VariableValue} from './messages';
 import {t} from './words';
 
 const SERIALIZER_NAME = 'nepWatched';
 const SERIALIZER_PRIORITY = 10;
 const PAGE_MARGIN = 6;
-
-/** Value of a variable, as returned by `VariableValue.to_json`. */
-export interface VariableValue {
-  kind: string;
-  text: string;
-  items: string[];
-  length: number;
-}
 
 interface Watched {
   id: string;

@@ -5,14 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
-from PySide6.QtCore import SignalInstance
-
-from app.blocks.model import deep_json
 from app.core.projects.backpack import Backpack, BackpackStack
 from app.errors import BackpackError
+from app.ui.blockly.messages import (
+    BackpackAdded,
+    BackpackEmptied,
+    BackpackItem,
+    BackpackMessage,
+    BackpackOpened,
+    BackpackRemoved,
+    reject_unhandled,
+)
 from app.ui.panels.base import PanelContext
 from nep.i18n import _, ngettext
-from nep.text import bounded_str
 
 POLL_TICKS = 30  # refreshes at 30 Hz: changes made by another instance of Studio appear within a second
 
@@ -20,24 +25,19 @@ POLL_TICKS = 30  # refreshes at 30 Hz: changes made by another instance of Studi
 class BackpackView(Protocol):
     """Interface of the block editor for displaying the backpack."""
 
-    backpack_requested: SignalInstance
-
-    def set_backpack(self, items: Sequence[Mapping[str, object]]) -> None: ...
+    def set_backpack(self, items: Sequence[BackpackItem]) -> None: ...
 
 
 class BackpackController:
-    """Handler of the block editor's requests about the backpack.
+    """Handler of the block editor's messages about the backpack.
 
-    A request is a JSON object with the operation in ``do``: "put" (with ``blocks``, ``count`` and
-    ``notes``), "remove" (with ``id``), "empty", or "look" to reload the file. The toast of each change
-    offers to undo it.
+    The toast of each change offers to undo it.
     """
 
     def __init__(self, context: PanelContext, backpack: Backpack, editor: BackpackView) -> None:
         self._context, self._backpack, self._editor = context, backpack, editor
         self._shown_revision = -1
         self._ticks = 0
-        editor.backpack_requested.connect(self._handle_request)
         self.reload_if_changed()
 
     def tick(self) -> None:
@@ -57,25 +57,21 @@ class BackpackController:
             self._context.show_toast(_capitalize_first(problem))
         if self._shown_revision != self._backpack.revision:
             self._shown_revision = self._backpack.revision
-            self._editor.set_backpack([item.to_json() for item in self._backpack.items])
+            self._editor.set_backpack([BackpackItem(item.id, item.block) for item in self._backpack.items])
 
-    def _handle_request(self, request_json: str) -> None:
-        try:
-            request = deep_json.loads(request_json)
-        except (ValueError, RecursionError):
-            return
-        if not isinstance(request, Mapping):
-            return
-        if request.get("do") == "look":
-            self.reload_if_changed()
-        elif request.get("do") == "put":
-            blocks, count = request.get("blocks"), request.get("count")
-            if isinstance(blocks, list) and isinstance(count, int):
-                self._add(blocks, count, has_notes=bool(request.get("notes")))
-        elif request.get("do") == "remove":
-            self._remove(lambda: self._backpack.remove([bounded_str(request.get("id"))]), removes_all=False)
-        elif request.get("do") == "empty":
-            self._remove(self._backpack.empty, removes_all=True)
+    def handle(self, message: BackpackMessage) -> None:
+        """Handle a message from the page about the backpack."""
+        match message:
+            case BackpackOpened():
+                self.reload_if_changed()
+            case BackpackAdded():
+                self._add(message.blocks, message.count, has_notes=message.has_notes)
+            case BackpackRemoved():
+                self._remove(lambda: self._backpack.remove([message.id]), removes_all=False)
+            case BackpackEmptied():
+                self._remove(self._backpack.empty, removes_all=True)
+            case _:
+                reject_unhandled(message)
 
     def _add(self, blocks: Sequence[Mapping[str, object]], count: int, *, has_notes: bool) -> None:
         # `has_notes` is True if the selection contained notes, which the backpack doesn't store.

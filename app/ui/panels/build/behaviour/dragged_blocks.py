@@ -5,12 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
-from PySide6.QtCore import QPoint, Qt, QTimer, SignalInstance
+from PySide6.QtCore import QPoint, Qt, QTimer
 from PySide6.QtGui import QPainter, QPaintEvent, QPixmap
 from PySide6.QtWidgets import QWidget
 
 from app.core.session import Session
 from app.ui.intents import ShowTab
+from app.ui.blockly.messages import (
+    BlocksDraggedOutside,
+    BlocksDroppedOutside,
+    BlocksTransferred,
+    DragImageRendered,
+    DragMessage,
+    PagePosition,
+    reject_unhandled,
+)
 from app.ui.panels.base import PanelContext
 from app.ui.panels.build.behaviour.tabs import NEW_TAB, BehaviourTabs
 from nep.i18n import _, ngettext
@@ -24,11 +33,7 @@ OPACITY = 0.85
 class DragSource(Protocol):
     """Interface of the block editor for dragging blocks out of its page."""
 
-    blocks_dragged_outside: SignalInstance
-    drag_picture_rendered: SignalInstance
-    blocks_dropped_outside: SignalInstance
-    blocks_transferred: SignalInstance
-
+    def to_screen(self, position: PagePosition) -> QPoint: ...
     def move_dragged_blocks(self) -> None: ...
     def undo_block_move(self) -> None: ...
 
@@ -121,10 +126,24 @@ class BlockDrag:
         self._scroll_timer = QTimer(tabs)
         self._scroll_timer.setInterval(SCROLL_INTERVAL_MS)
         self._scroll_timer.timeout.connect(self._scroll)
-        editor.blocks_dragged_outside.connect(self._drag_moved)
-        editor.drag_picture_rendered.connect(self._set_image)
-        editor.blocks_dropped_outside.connect(self._on_dropped)
-        editor.blocks_transferred.connect(self._on_transferred)
+
+    def handle(self, message: DragMessage) -> None:
+        """Handle a message from the page about dragged blocks."""
+        match message:
+            case BlocksDraggedOutside():
+                position = message.position
+                self._drag_moved(
+                    self._editor.to_screen(position) if position is not None else None, message.tab
+                )
+            case DragImageRendered():
+                if self._picture is not None:
+                    self._picture.set_picture(message.png, message.ratio)
+            case BlocksDroppedOutside():
+                self._on_dropped(self._editor.to_screen(message.position))
+            case BlocksTransferred():
+                self._on_transferred(message.count, message.mode, message.source_tab)
+            case _:
+                reject_unhandled(message)
 
     def _target(self, position: QPoint) -> str:
         target = self._tabs.target_at(position)
@@ -163,10 +182,6 @@ class BlockDrag:
         if self._drag_position is not None and self._hovered_target not in {"", NEW_TAB}:
             self._context.request(ShowTab(self._hovered_target))
             self._show()
-
-    def _set_image(self, data: bytes, ratio: float) -> None:
-        if self._picture is not None:
-            self._picture.set_picture(data, ratio)
 
     def _move_image(self, position: QPoint | None) -> None:
         window = self._tabs.window()

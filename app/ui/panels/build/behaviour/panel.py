@@ -9,8 +9,7 @@ from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Protocol, cast
 
-from msgspec import to_builtins
-from PySide6.QtCore import Qt, SignalInstance
+from PySide6.QtCore import QPoint, Qt, SignalInstance
 from PySide6.QtGui import QGuiApplication, QPageLayout
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
@@ -35,6 +34,25 @@ from app.ui.intents import (
     ToggleVariableWatch,
     TryStack,
 )
+from app.ui.blockly.messages import (
+    BackpackAdded,
+    BackpackEmptied,
+    BackpackOpened,
+    BackpackRemoved,
+    BlocksDeleted,
+    BlocksDraggedOutside,
+    BlocksDroppedOutside,
+    BlocksTransferred,
+    CanvasButtonPressed,
+    CommandRequested,
+    DragImageRendered,
+    FlyoutPinned,
+    HistoryChanged,
+    SensorsShown,
+    StackTried,
+    VariablesWatched,
+    reject_unhandled,
+)
 from app.ui.panels.base import PanelContext, PanelWidget
 from app.ui.panels.build.behaviour.backpack_storage import BackpackController
 from app.ui.panels.build.behaviour.dragged_blocks import BlockDrag
@@ -52,10 +70,18 @@ from nep.i18n import _, lazy, ngettext, pgettext
 if TYPE_CHECKING:
     from app.blocks.model.program import Program
     from app.blocks.model.workspace_json import WorkspaceJson
+    from app.blocks.runtime.variables import VariableValue
     from app.core.network.watches import Suspendable, Watch
     from app.core.projects.open_project import OpenProject
     from app.core.robots.robot_link import RobotLink
     from app.core.run.control import Runs
+    from app.ui.blockly.messages import (
+        BackpackItem,
+        EditCommand,
+        PagePosition,
+        PanelMessage,
+        PictureKind,
+    )
 
 LIVE_UPDATE_TICKS = 6  # refreshes at 30 Hz: values on sensor blocks are updated five times a second
 ALARM_STATES = frozenset({NOT_STOPPED, STOPPING, "silent"})
@@ -77,21 +103,9 @@ class Editor(Protocol):
     """Interface of the block editor (`app.ui.blockly.view.BlocklyView`)."""
 
     changed: SignalInstance
-    history_changed: SignalInstance
     key_pressed: SignalInstance
     recovered: SignalInstance
-    visible_sensors_changed: SignalInstance
-    command_requested: SignalInstance
-    watched_variables_changed: SignalInstance
-    canvas_button_pressed: SignalInstance
-    try_requested: SignalInstance
-    toolbox_pinned: SignalInstance
-    blocks_deleted: SignalInstance
-    blocks_dragged_outside: SignalInstance
-    drag_picture_rendered: SignalInstance
-    blocks_dropped_outside: SignalInstance
-    blocks_transferred: SignalInstance
-    backpack_requested: SignalInstance
+    message_received: SignalInstance
 
     @property
     def is_ready(self) -> bool: ...
@@ -111,18 +125,19 @@ class Editor(Protocol):
     def set_absent(self, ids: Sequence[str]) -> None: ...
     def set_live_values(self, values: Mapping[str, str], stale_keys: Collection[str] = ()) -> None: ...
     def set_alarms(self, alarms: Mapping[str, tuple[str, str]]) -> None: ...
-    def set_variable_values(self, values: Mapping[str, Mapping[str, object]]) -> None: ...
+    def set_variable_values(self, values: Mapping[str, VariableValue]) -> None: ...
     def edit_variable(self, edit: Json) -> None: ...
-    def set_backpack(self, items: Sequence[Json]) -> None: ...
+    def set_backpack(self, items: Sequence[BackpackItem]) -> None: ...
     def set_canvas_hint(self, label: str, has_robot: bool) -> None: ...
     def point_at(self, block: str, name: str = "", placement_hint: str = "") -> None: ...
     def undo(self) -> None: ...
-    def edit(self, command: str) -> None: ...
-    def edit_from_menu(self, command: str) -> None: ...
+    def edit(self, command: EditCommand) -> None: ...
+    def edit_from_menu(self, command: EditCommand) -> None: ...
     def undo_deletion(self) -> None: ...
     def move_dragged_blocks(self) -> None: ...
     def undo_block_move(self) -> None: ...
-    def render_picture(self, kind: str, white: bool, callback: Callable[[bytes], None]) -> None: ...
+    def to_screen(self, position: PagePosition) -> QPoint: ...
+    def render_picture(self, kind: PictureKind, white: bool, callback: Callable[[bytes], None]) -> None: ...
     def render_pdf(
         self, title: str, date: str, layout: QPageLayout, callback: Callable[[bytes], None]
     ) -> None: ...
@@ -225,9 +240,7 @@ class BehaviourPanel(PanelWidget):
             editor.set_alarms(alarms)
         if self._has_changed("values", (runs.values_revision, is_shown_run, self._watched_variable_ids)):
             values = runs.values if is_shown_run else {}
-            editor.set_variable_values(
-                {id: to_builtins(values[id]) for id in self._watched_variable_ids if id in values}
-            )
+            editor.set_variable_values({id: values[id] for id in self._watched_variable_ids if id in values})
         if self._ticks % LIVE_UPDATE_TICKS == 0:
             self._show_live_values()
         if self._backpack is not None:
@@ -281,15 +294,8 @@ class BehaviourPanel(PanelWidget):
         editor.recovered.connect(
             lambda: self.context.show_toast(_("The block editor was restarted. Undo history was cleared."))
         )
-        editor.history_changed.connect(self._history_changed)
         editor.key_pressed.connect(self._key_pressed)
-        editor.visible_sensors_changed.connect(self._set_flyout_sensors)
-        editor.command_requested.connect(self._run_page_command)
-        editor.watched_variables_changed.connect(self._watch_variables)
-        editor.canvas_button_pressed.connect(lambda what: self.context.run(START_COMMANDS[what]))
-        editor.try_requested.connect(self._try_stack)
-        editor.toolbox_pinned.connect(self._save_pinned)
-        editor.blocks_deleted.connect(lambda count: self._blocks_deleted(editor, count))
+        editor.message_received.connect(self._on_message)
         self._block_drag = BlockDrag(
             self.context, self.session, self._bar.tabs, editor, self.flush, self.show_current
         )
@@ -312,9 +318,6 @@ class BehaviourPanel(PanelWidget):
             self.context.request(PAGE_INTENTS[name](id))
         else:
             self.context.run(command)
-
-    def _try_stack(self, stack: str) -> None:
-        self.context.request(TryStack(Stack.from_json(deep_json.loads(stack))))
 
     def _show_missing_libraries(self, missing: MissingLibraries) -> None:
         alert_missing(self.session.alerts, missing)
@@ -344,12 +347,35 @@ class BehaviourPanel(PanelWidget):
             if self.session.fleet.link(name) is not None:
                 self._watches[name] = self.session.fleet.watch_sensors(name)
 
-    def _set_flyout_sensors(self, sensors: tuple[tuple[str, str], ...]) -> None:
-        self._flyout_sensors = sensors
-        self._show_live_values()
-
-    def _watch_variables(self, ids: tuple[str, ...]) -> None:
-        self._watched_variable_ids = ids
+    def _on_message(self, message: PanelMessage) -> None:
+        backpack, block_drag = self._backpack, self._block_drag
+        if backpack is None or block_drag is None:
+            return
+        match message:
+            case HistoryChanged():
+                self._bar.undo.setEnabled(message.can_undo)
+                self._bar.redo.setEnabled(message.can_redo)
+            case FlyoutPinned():
+                self._save_pinned(message.is_pinned)
+            case BlocksDeleted():
+                self._blocks_deleted(message.count)
+            case SensorsShown():
+                self._flyout_sensors = message.sensors
+                self._show_live_values()
+            case VariablesWatched():
+                self._watched_variable_ids = message.ids
+            case CommandRequested():
+                self._run_page_command(message.command)
+            case CanvasButtonPressed():
+                self.context.run(START_COMMANDS[message.button])
+            case StackTried():
+                self.context.request(TryStack(Stack(message.id, message.kind, message.state)))
+            case BackpackOpened() | BackpackAdded() | BackpackRemoved() | BackpackEmptied():
+                backpack.handle(message)
+            case BlocksDraggedOutside() | DragImageRendered() | BlocksDroppedOutside() | BlocksTransferred():
+                block_drag.handle(message)
+            case _:
+                reject_unhandled(message)
 
     def edit_variable(self, edit: Mapping[str, object]) -> None:
         """Run an operation on a variable in the blocks view.
@@ -372,9 +398,10 @@ class BehaviourPanel(PanelWidget):
         with suppress(SettingsError):
             self.session.settings.toolbox_pinned = is_pinned
 
-    def _blocks_deleted(self, editor: Editor, count: int) -> None:
+    def _blocks_deleted(self, count: int) -> None:
         message = ngettext("Deleted {count} block", "Deleted {count} blocks", count).format(count=count)
-        self.context.show_toast(message, _("Undo"), editor.undo_deletion)
+        if self.editor is not None:
+            self.context.show_toast(message, _("Undo"), self.editor.undo_deletion)
 
     def _show_live_values(self) -> None:
         sensors = dict.fromkeys((*self._sensors, *self._flyout_sensors))
@@ -432,7 +459,7 @@ class BehaviourPanel(PanelWidget):
         if self.editor is not None and self.mode == "blocks":
             self.editor.edit_from_menu(command)
 
-    def render_picture(self, kind: str, white: bool, callback: Callable[[bytes], None]) -> None:
+    def render_picture(self, kind: PictureKind, white: bool, callback: Callable[[bytes], None]) -> None:
         """Render all blocks of the active behaviour as an image.
 
         Args:
@@ -512,10 +539,6 @@ class BehaviourPanel(PanelWidget):
     def _name_problem(self, key: str, name: str) -> str:
         document = self.session.documents.find_by_key(key)
         return name_problem(name, document.path) if document is not None else ""
-
-    def _history_changed(self, can_undo: bool, can_redo: bool) -> None:
-        self._bar.undo.setEnabled(can_undo)
-        self._bar.redo.setEnabled(can_redo)
 
     def _key_pressed(self, key: str) -> None:
         self.context.request(PressKey(key))  # the shortcut table knows the command of this key
