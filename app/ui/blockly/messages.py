@@ -294,7 +294,6 @@ HostMessage: TypeAlias = (
 ViewMessage: TypeAlias = WorkspaceEdited | WorkspaceFlushed | PngRendered | SvgRendered | PagesLaidOut
 BackpackMessage: TypeAlias = BackpackOpened | BackpackAdded | BackpackRemoved | BackpackEmptied
 DragMessage: TypeAlias = BlocksDraggedOutside | DragImageRendered | BlocksDroppedOutside | BlocksTransferred
-"""Requests to run a command of the window."""
 PanelMessage: TypeAlias = (
     HistoryChanged
     | FlyoutPinned

@@ -9,7 +9,6 @@ from PySide6.QtWidgets import QLabel, QWidget
 
 from app.blocks.model.workspace_json import WorkspaceJson
 from app.core.reports.not_installed import ALERT_ID
-from app.ui.intents import PressKey, ShowTab
 from app.ui.blockly.messages import (
     BlocksDeleted,
     BlocksDraggedOutside,
@@ -22,6 +21,7 @@ from app.ui.blockly.messages import (
     PanelMessage,
     SensorsShown,
 )
+from app.ui.intents import PressKey, ShowTab
 from app.ui.panels.base import Panel
 from app.ui.panels.build.behaviour.dragged_blocks import POINTER_OFFSET, DragImage, transfer_text
 from app.ui.panels.build.behaviour.panel import BehaviourPanel

@@ -10,7 +10,6 @@ from PySide6.QtGui import QPainter, QPaintEvent, QPixmap
 from PySide6.QtWidgets import QWidget
 
 from app.core.session import Session
-from app.ui.intents import ShowTab
 from app.ui.blockly.messages import (
     BlocksDraggedOutside,
     BlocksDroppedOutside,
@@ -20,6 +19,7 @@ from app.ui.blockly.messages import (
     PagePosition,
     reject_unhandled,
 )
+from app.ui.intents import ShowTab
 from app.ui.panels.base import PanelContext
 from app.ui.panels.build.behaviour.tabs import NEW_TAB, BehaviourTabs
 from nep.i18n import _, ngettext

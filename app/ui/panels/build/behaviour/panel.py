@@ -13,7 +13,6 @@ from PySide6.QtCore import QPoint, Qt, SignalInstance
 from PySide6.QtGui import QGuiApplication, QPageLayout
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from app.blocks.model import deep_json
 from app.blocks.model.stack import Stack
 from app.core.projects.backpack import Backpack
 from app.core.projects.rename import name_problem
@@ -22,18 +21,6 @@ from app.core.reports.not_installed import MissingLibraries, alert_missing, miss
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.errors import SettingsError
 from app.intents import Intent, RenameVariable
-from app.ui.intents import (
-    BlockEdit,
-    CloseTab,
-    DeleteVariable,
-    MenuEdit,
-    MoveTab,
-    PressKey,
-    RenameTab,
-    ShowTab,
-    ToggleVariableWatch,
-    TryStack,
-)
 from app.ui.blockly.messages import (
     BackpackAdded,
     BackpackEmptied,
@@ -52,6 +39,18 @@ from app.ui.blockly.messages import (
     StackTried,
     VariablesWatched,
     reject_unhandled,
+)
+from app.ui.intents import (
+    BlockEdit,
+    CloseTab,
+    DeleteVariable,
+    MenuEdit,
+    MoveTab,
+    PressKey,
+    RenameTab,
+    ShowTab,
+    ToggleVariableWatch,
+    TryStack,
 )
 from app.ui.panels.base import PanelContext, PanelWidget
 from app.ui.panels.build.behaviour.backpack_storage import BackpackController
