@@ -17,10 +17,9 @@ from msgspec.structs import replace
 
 from nep.backends.zeromq.bindings import has_room_for_unix_sockets, select_endpoint
 from nep.backends.zeromq.io_thread import IoThread, PollState
-from nep.backends.zeromq.pattern_subscriber import PatternSubscriber
+from nep.backends.zeromq.native_subscriber import NativeSubscriber
 from nep.backends.zeromq.rpc import PendingRequest, RpcClient
 from nep.backends.zeromq.sockets import CONNECT_TIMEOUT_MS, Socket, local_address_towards
-from nep.backends.zeromq.subscriber import NativeSubscriber
 from nep.errors import (
     AddressInUseError,
     ClosedError,
@@ -112,15 +111,20 @@ class SessionSubscriber(Protocol):
             is_closed: True if the publisher unregistered, False if its node doesn't respond.
         """
 
-    def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
-        """Replace the list of publishers."""
+    def reconcile(self, remotes: Iterable[RemotePublisher], topic: str = "") -> None:
+        """Replace the list of publishers.
 
-    def handle_renewal(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
+        Args:
+            remotes: All publishers.
+            topic: Topic of the publishers; "" for all topics of the subscriber.
+        """
+
+    def handle_renewal(self, now: float, last_seqs: Mapping[int, int]) -> None:
         """Handle a renewal.
 
         Args:
             now: Current time (`time.monotonic`).
-            last_seqs: (publisher id, newest sequence number known to the master) of each publisher.
+            last_seqs: Newest sequence number known to the master of each publisher, by id.
         """
 
     def reconnect_remote(self) -> None:
@@ -181,7 +185,7 @@ class MasterSession:
         self._client = RpcClient(socket, address, after_use=lambda: io.serve_soon(self))
         self._lock = threading.Lock()
         self._publishers: dict[int, tuple[PublisherRecord, SessionPublisher]] = {}
-        self._subscribers: dict[int, tuple[SubscriberRecord, SessionSubscriber | PatternSubscriber]] = {}
+        self._subscribers: dict[int, tuple[SubscriberRecord, SessionSubscriber]] = {}
         self._confirmed_ids: set[int] = set()
         self._epoch, self._revision = 0, 0
         self._join_retry_at = 0.0
@@ -277,7 +281,7 @@ class MasterSession:
     def add_subscriber(
         self,
         record: SubscriberRecord,
-        subscriber: SessionSubscriber | PatternSubscriber,
+        subscriber: SessionSubscriber,
         wait_s: float | None,
     ) -> FoundReply:
         """Register a subscriber and return the master's reply with the publishers to connect to.
@@ -460,15 +464,11 @@ class MasterSession:
         )
         for subscriber in self._subscribers_of(added.publisher.publisher.topic):
             if added.is_new and has_valid_endpoint and isinstance(subscriber, NativeSubscriber):
-                subscriber.expect_all_messages(added.publisher.publisher.id)
+                subscriber.expect_all_messages(added.publisher)
             subscriber.connect(remotes)
 
     def _handle_publisher_removed(self, removed: PublisherRemoved) -> None:
-        if removed.is_closed:
-            for _record, pattern_subscriber in self._all_subscribers():
-                if isinstance(pattern_subscriber, PatternSubscriber):
-                    pattern_subscriber.record_early_close(removed.id)
-        for subscriber in self._subscribers_of(removed.topic, may_create=False):
+        for subscriber in self._subscribers_of(removed.topic):
             subscriber.handle_publisher_removed(removed.id, removed.last_seq, is_closed=removed.is_closed)
 
     def _renew(self) -> None:
@@ -515,10 +515,10 @@ class MasterSession:
         self._renewal_timer.set_interval(reply.next_s, now)
         for topic in reply.topics:
             for subscriber in self._subscribers_of(topic.topic):
-                subscriber.reconcile(self._select_endpoints(topic.publishers))
+                subscriber.reconcile(self._select_endpoints(topic.publishers), topic.topic)
         self._update_clocks(self._parse_clock_differences(reply))
         for _record, session_subscriber in self._all_subscribers():
-            session_subscriber.handle_renewal(now, reply.last_seqs.items())
+            session_subscriber.handle_renewal(now, reply.last_seqs)
 
     def _parse_clock_differences(self, reply: RenewedReply) -> Mapping[str, ClockDifference]:
         known_at_ns = time.monotonic_ns()
@@ -536,7 +536,7 @@ class MasterSession:
             self._clock_differences = clocks
             for _record, subscriber in self._all_subscribers():
                 # replies of servers have no time stamps
-                if isinstance(subscriber, NativeSubscriber | PatternSubscriber):
+                if isinstance(subscriber, NativeSubscriber):
                     subscriber.set_clock_differences(clocks)
 
     def _join(self, now: float) -> None:
@@ -567,36 +567,22 @@ class MasterSession:
         for remote in self._select_endpoints(reply.publishers):
             publishers_by_topic.setdefault(remote.publisher.topic, []).append(remote)
         for record, subscriber in self._all_subscribers():
-            if isinstance(subscriber, PatternSubscriber):
-                for topic in {
-                    *subscriber.topics,
-                    *(each for each in publishers_by_topic if _matches_pattern(record, each)),
-                }:
-                    member = subscriber.member(topic)
-                    if member is not None:
-                        member.reconcile(publishers_by_topic.get(topic, ()))
-            else:
-                subscriber.reconcile(publishers_by_topic.get(record.topic, ()))
+            topics = (
+                [each for each in publishers_by_topic if matches(record.topic, each)]
+                if record.pattern
+                else [record.topic]
+            )
+            subscriber.reconcile(
+                [remote for topic in topics for remote in publishers_by_topic.get(topic, ())]
+            )
 
-    def _subscribers_of(self, topic: str, *, may_create: bool = True) -> list[SessionSubscriber]:
-        # Pattern subscribers create a member for a new topic only with `may_create`.
-        subscribers: list[SessionSubscriber] = []
-        for record, subscriber in self._all_subscribers():
-            if isinstance(subscriber, PatternSubscriber):
-                member = (
-                    subscriber.member(topic, may_create=may_create)
-                    if _matches_pattern(record, topic)
-                    else None
-                )
-                subscribers += () if member is None else (member,)
-            elif record.topic == topic:
-                subscribers.append(subscriber)
-        return subscribers
+    def _subscribers_of(self, topic: str) -> list[SessionSubscriber]:
+        return [
+            subscriber
+            for record, subscriber in self._all_subscribers()
+            if (matches(record.topic, topic) if record.pattern else record.topic == topic)
+        ]
 
-    def _all_subscribers(self) -> list[tuple[SubscriberRecord, SessionSubscriber | PatternSubscriber]]:
+    def _all_subscribers(self) -> list[tuple[SubscriberRecord, SessionSubscriber]]:
         with self._lock:
             return list(self._subscribers.values())
-
-
-def _matches_pattern(record: SubscriberRecord, topic: str) -> bool:
-    return record.pattern and matches(record.topic, topic)

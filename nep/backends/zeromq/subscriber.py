@@ -1,7 +1,6 @@
 """Subscriber over a socket, with a lock, an inbox and readers.
 
-`SocketSubscriber` reads from any `Readable`, a socket that returns messages. `NativeSubscriber` is for
-the native wire and connects to publishers when they register.
+`SocketSubscriber` reads from any `Readable`, a socket that returns messages.
 
 A reader leases the socket for a moment, in which the I/O thread doesn't read: a `listen` loop receives
 messages directly from the socket in its own thread. Without a reader, the I/O thread moves messages
@@ -20,7 +19,7 @@ import math
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Generic, Protocol, TypeVar
 
@@ -32,7 +31,6 @@ from nep.backends.bases.message_parser import MessageBuffer
 from nep.backends.bases.rejections import RejectionCounter
 from nep.backends.zeromq.io_thread import IoThread, PollState
 from nep.backends.zeromq.sockets import SHORT_WAIT_S
-from nep.messages.clocks import ClockDifference
 from nep.messages.message import Message
 from nep.messages.queue import MAX_READ_AHEAD, Inbox
 from nep.protocol.requests import RemotePublisher, SubscriberCount, clamp_count
@@ -430,139 +428,3 @@ class SocketSubscriber(Generic[R]):
         self._woken_waiters.update(self._waiters)
         for waker in self._waiters:
             waker.wake()
-
-
-class NativeSubscriber(SocketSubscriber[NativeReadable]):
-    """Subscriber on the native wire. The master session reports added and removed publishers."""
-
-    def __init__(
-        self, readable: NativeReadable, io: IoThread, spec: SubscriberSpec, on_close: Callable[[int], None]
-    ) -> None:
-        super().__init__(readable, io, spec, on_close)
-        self._early_closed_ids: set[int] | None = set()
-        """Ids of publishers that closed before `connect_listed`; None after `connect_listed`."""
-
-    @property
-    def has_publishers(self) -> bool:
-        """True if there are any publishers, including silent ones."""
-        with self._requested_lock():
-            return bool(self._readable.sources.by_id)
-
-    def wait_for(self, publishers: Iterable[int], timeout_s: float, waker: Waker) -> bool:
-        """Wait up to `timeout_s` seconds for the echo of these publishers; return False on timeout.
-
-        Publishers that send a bye in the meantime, or to which connecting fails, are skipped.
-
-        Args:
-            publishers: Ids of the publishers.
-            timeout_s: Maximum time in seconds.
-            waker: Waker that ends a wait early, so that the condition is checked again.
-        """
-        expected = frozenset(publishers)
-        sources = self._readable.sources
-        return self.read_until(
-            lambda: all(
-                source.has_echoed or source.problem for each, source in sources.items() if each in expected
-            ),
-            timeout_s,
-            waker,
-        )
-
-    def wait_for_any(self, timeout_s: float, waker: Waker) -> bool:
-        """Wait up to `timeout_s` seconds for the echo of any publisher; return False on timeout."""
-        sources = self._readable.sources
-        return self.read_until(
-            lambda: any(source.has_echoed for _each, source in sources.items()), timeout_s, waker
-        )
-
-    @property
-    def endpoints(self) -> tuple[str, ...]:
-        """Endpoints of all connections."""
-        return tuple(source.endpoint for _each, source in self._readable.sources.items() if source.endpoint)
-
-    def connect_listed(self, remotes: Iterable[RemotePublisher]) -> None:
-        """Connect to the publishers listed at registration, except those that have closed in the meantime.
-
-        The notification of a close and the reply to the registration are read in different threads, so the
-        notification may be handled first.
-        """
-        with self._requested_lock():
-            closed_ids, self._early_closed_ids = self._early_closed_ids or set(), None
-            self._connect_locked(each for each in remotes if each.publisher.id not in closed_ids)
-
-    def expect_all_messages(self, publisher: int) -> None:
-        """Count losses from the first message of a publisher that was created after this subscriber."""
-        with self._requested_lock():
-            is_registered = self._early_closed_ids is None
-            if is_registered and not self.is_closed:
-                self._readable.sources.expect_all_messages(publisher)
-
-    def connect(self, remotes: Iterable[RemotePublisher]) -> None:
-        """Connect to publishers. Idempotent."""
-        with self._requested_lock():
-            self._connect_locked(remotes)
-
-    def _connect_locked(self, remotes: Iterable[RemotePublisher]) -> None:
-        if not self.is_closed:
-            for remote in remotes:
-                self._readable.connect(remote)
-            self._recheck_input_locked()
-
-    def reconnect_remote(self) -> None:
-        """Reconnect to publishers on other computers, because the address of this computer has changed."""
-        with self._requested_lock():
-            if not self.is_closed:
-                self._fill_locked()
-                self._wake_waiters_locked()
-                self._readable.reconnect_remote()
-                self._recheck_input_locked()
-
-    def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
-        """Replace the list of publishers: connect to new ones, and mark unlisted ones as silent."""
-        publishers = tuple(remotes)
-        self.connect(publishers)
-        listed_ids = {remote.publisher.id for remote in publishers}
-        with self._requested_lock():
-            for publisher_id, source in self._readable.sources.items():
-                if publisher_id not in listed_ids and source.remote is not None:
-                    source.is_silent = True
-
-    def handle_publisher_removed(self, publisher: int, last_seq: int, *, is_closed: bool) -> None:
-        """Handle the removal of a publisher. See `SessionSubscriber.handle_publisher_removed`.
-
-        The connection stays open until the publisher's bye, or until the publisher is replaced.
-        """
-        with self._requested_lock():
-            if is_closed and self._early_closed_ids is not None:
-                self._early_closed_ids.add(publisher)
-            if is_closed:
-                self._readable.sources.mark_closing(publisher, last_seq, time.monotonic())
-            else:
-                self._readable.sources.mark_silent(publisher, last_seq)
-
-    def set_clock_differences(self, clocks: Mapping[str, ClockDifference]) -> None:
-        """Set the clock differences of other computers, given by node id."""
-        with self._requested_lock():
-            self._readable.sources.set_clock_differences(clocks)
-
-    def handle_renewal(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
-        """Handle a renewal: remove publishers that closed without a bye, and update the losses.
-
-        Args:
-            now: Current time (`time.monotonic`).
-            last_seqs: (publisher id, newest sequence number known to the master) of each publisher.
-        """
-        with self._requested_lock():
-            if self.is_closed:
-                return
-            sources = self._readable.sources
-            for publisher in sources.expired_publishers(now):
-                sources.count_missing(publisher)
-                self._readable.disconnect(publisher)
-            if not self._readable.has_input:
-                # libzmq never connects again after a failed handshake, as with another program's PULL.
-                for publisher in sources.unresponsive_publishers(now):
-                    self._readable.reconnect(publisher)
-                for publisher, seq in last_seqs:
-                    sources.expect_up_to(publisher, seq)
-            self._recheck_input_locked()

@@ -32,12 +32,13 @@ from nep.backends.zeromq.checked_sub_socket import CHECKED_TYPES, CheckedSubSock
 from nep.backends.zeromq.io_thread import IoThread, Pollable, SharedContext, shared_context
 from nep.backends.zeromq.legacy import OriginalPublisher, OriginalSubscriber, OriginalSubSocket, attach
 from nep.backends.zeromq.master_session import MasterSession, SessionPublisher
-from nep.backends.zeromq.pattern_subscriber import PatternSubscriber
+from nep.backends.zeromq.native_subscriber import NativeSubscriber
 from nep.backends.zeromq.publisher import NativePublisher
 from nep.backends.zeromq.services.node_services import ZeromqServices
 from nep.backends.zeromq.sockets import Socket
 from nep.backends.zeromq.sub_socket import SubSocket
-from nep.backends.zeromq.subscriber import NativeReadable, NativeSubscriber, Readable, SocketSubscriber
+from nep.backends.zeromq.subscriber import NativeReadable, Readable, SocketSubscriber
+from nep.backends.zeromq.topic_sockets import TopicSockets
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.protocol.graph_view import GraphView
@@ -53,7 +54,7 @@ _LEAVE_TIMEOUT_S = 0.3
 _FDS_PER_THREAD = 4
 _MAX_IDLE_SESSIONS = 8
 """Maximum number of open sessions without registrations."""
-_Subscriber = SocketSubscriber[Readable] | NativeSubscriber | OriginalSubscriber | PatternSubscriber
+_Subscriber = SocketSubscriber[Readable] | NativeSubscriber | OriginalSubscriber
 
 
 class OwnedPublisher(PublisherTransport, Pollable, Protocol):
@@ -241,9 +242,7 @@ class ZeromqTransport:
                 return self._create_direct_subscriber(spec, spec.configuration)
             return self._create_native_subscriber(spec, spec.configuration)
 
-    def _create_native_subscriber(
-        self, spec: SubscriberSpec, configuration: Hybrid
-    ) -> NativeSubscriber | PatternSubscriber:
+    def _create_native_subscriber(self, spec: SubscriberSpec, configuration: Hybrid) -> NativeSubscriber:
         session = self._session(configuration.master)
         session.wait_for_address(spec.wait_s)
 
@@ -252,15 +251,10 @@ class ZeromqTransport:
             session.remove_subscriber(subscriber)
 
         io = self._io_for(spec)
-        subscriber: NativeSubscriber | PatternSubscriber
-        if spec.is_pattern:
-            subscriber = PatternSubscriber(self._new_readable, io, spec, unregister)
+        readable = TopicSockets(self._new_readable, spec) if spec.is_pattern else self._new_readable(spec)
+        subscriber = NativeSubscriber(readable, io, spec, unregister)
+        with close_on_error(readable.close):
             self._add_subscriber(subscriber)
-        else:
-            readable = self._new_readable(spec)
-            subscriber = NativeSubscriber(readable, io, spec, unregister)
-            with close_on_error(readable.close):
-                self._add_subscriber(subscriber)
         record = SubscriberRecord(spec.id, spec.topic, spec.msg_type, spec.number, spec.is_pattern)
         try:
             reply = session.add_subscriber(record, subscriber, spec.wait_s)
@@ -271,8 +265,7 @@ class ZeromqTransport:
                     )
                 )
             subscriber.connect_listed(reply.publishers)
-            if isinstance(subscriber, NativeSubscriber):
-                self._start_serving(io, subscriber)
+            self._start_serving(io, subscriber)
             with self._waker() as waker:
                 subscriber.wait_for(
                     (each.publisher.id for each in reply.publishers), HANDSHAKE_TIMEOUT_S, waker
@@ -396,7 +389,7 @@ class ZeromqTransport:
                     return
                 entered_calls.append(queue)
             for subscriber in subscribers:
-                if isinstance(subscriber, SocketSubscriber | PatternSubscriber):
+                if isinstance(subscriber, SocketSubscriber):
                     if not subscriber.enter_wait(thread_wait.waker):
                         return
                     entered.append(subscriber)
@@ -519,7 +512,7 @@ class ZeromqTransport:
         for session in self._sessions.values():
             close_in_child(session.endpoint)
         for endpoint_owner in (*self._publishers, *self._subscribers.values()):
-            if isinstance(endpoint_owner, NativePublisher | NativeSubscriber | PatternSubscriber):
+            if isinstance(endpoint_owner, NativePublisher | NativeSubscriber):
                 close_in_child(*endpoint_owner.endpoints)
 
     def _session(self, address: str) -> MasterSession:

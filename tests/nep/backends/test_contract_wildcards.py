@@ -301,12 +301,12 @@ def test_older_master_without_wildcards_is_reported(
 def test_topics_of_closed_publishers_are_unsubscribed(master: Master) -> None:
     with nep.node("b") as node, nep.node("a") as other:
         sub = node.new_sub("r/*")
-        members = sub._transport._members  # type: ignore[attr-defined]
+        topics = sub._transport._topics  # type: ignore[attr-defined]
         for n in range(5):
             with other.new_pub(f"r/{n}") as pub:
                 pub.publish(n)
         assert len(read(sub, 5)) == 5
-        eventually(lambda: not members)
+        eventually(lambda: not topics.sockets)
         assert (sub.received, sub.lost) == (5, 0)
 
 

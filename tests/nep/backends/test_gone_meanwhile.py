@@ -9,7 +9,7 @@ import pytest
 
 import nep
 from nep.backends.zeromq.master_session import MasterSession
-from nep.backends.zeromq.subscriber import NativeSubscriber
+from nep.backends.zeromq.native_subscriber import NativeSubscriber
 from nep.masters.master import Master
 from nep.protocol.requests import FoundReply, SubscriberRecord
 from tests.nep.programs import eventually

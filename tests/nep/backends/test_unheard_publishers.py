@@ -13,8 +13,9 @@ from nep.backends.base import SubscriberSpec
 from nep.backends.bases.loss import MAX_GAP, PublisherTracker
 from nep.backends.connection import Hybrid
 from nep.backends.zeromq.io_thread import IoThread
-from nep.backends.zeromq.pattern_subscriber import PatternSubscriber
+from nep.backends.zeromq.native_subscriber import NativeSubscriber
 from nep.backends.zeromq.sub_socket import SubSocket
+from nep.backends.zeromq.topic_sockets import TopicSockets
 from nep.masters.master import Master
 from nep.protocol.requests import (
     AddedReply,
@@ -107,23 +108,22 @@ def test_history_that_arrives_after_a_renewal_is_counted_as_received() -> None:
 
 
 def test_unregistered_pattern_expects_no_messages_of_a_new_publisher() -> None:
-    sockets: list[SubSocket] = []
+    def new_socket(spec: SubscriberSpec) -> SubSocket:
+        return SubSocket(context.socket(zmq.SUB), spec)
 
-    def new_readable(spec: SubscriberSpec) -> SubSocket:
-        sockets.append(SubSocket(context.socket(zmq.SUB), spec))
-        return sockets[-1]
+    def new_remote(publisher: int) -> RemotePublisher:
+        return RemotePublisher(PublisherRecord(publisher, "t", "json", "json"), "n", "name")
 
     spec = SubscriberSpec(1, "*", "json", Hybrid("127.0.0.1:0"), None, is_pattern=True)
     io = IoThread("nep-io-test")
     io.start()
     with zmq.Context() as context:
-        pattern = PatternSubscriber(new_readable, io, spec, lambda _id: None)
-        member = pattern.member("t")
-        assert member is not None
-        member.expect_all_messages(5)
+        sockets = TopicSockets(new_socket, spec)
+        pattern = NativeSubscriber(sockets, io, spec, lambda _id: None)
+        pattern.expect_all_messages(new_remote(5))
         pattern.connect_listed(())
-        member.expect_all_messages(6)
-        assert [each for each, _source in sockets[0].sources.items()] == [6]
+        pattern.expect_all_messages(new_remote(6))
+        assert [list(each.sources.by_id) for each in sockets.sockets] == [[6]]
         pattern.close()
     io.close()
 

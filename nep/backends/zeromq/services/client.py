@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Protocol
 
 import zmq
@@ -241,7 +241,7 @@ class SocketClient(PendingCalls[PendingCall]):
                 self._connected_endpoint = ""
         self._serve_soon(self)
 
-    def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
+    def reconcile(self, remotes: Iterable[RemotePublisher], topic: str = "") -> None:  # noqa: ARG002 - a service has one
         """Replace the list of servers. If no server is left, an existing connection is kept."""
         with self._lock:
             self._original_ids = {each for each in self._original_ids if each == self._current_id}
@@ -257,7 +257,7 @@ class SocketClient(PendingCalls[PendingCall]):
             self._retry_at = 0.0
         self._serve_soon(self)
 
-    def handle_renewal(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
+    def handle_renewal(self, now: float, last_seqs: Mapping[int, int]) -> None:
         """Do nothing, because replies have no sequence numbers."""
 
     def counts(self) -> SubscriberCount:

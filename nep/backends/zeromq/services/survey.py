@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from nep.backends.services import ClientSpec, OpenCall, Outcome
@@ -151,7 +151,7 @@ class SurveyClient:
         with self._lock:
             self._remove_respondent(publisher)
 
-    def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
+    def reconcile(self, remotes: Iterable[RemotePublisher], topic: str = "") -> None:  # noqa: ARG002 - a service has one
         """Replace the list of respondents."""
         endpoints_by_id = {each.publisher.id: each.publisher.endpoints for each in remotes}
         with self._lock:
@@ -162,7 +162,7 @@ class SurveyClient:
             for respondent, endpoints in endpoints_by_id.items():
                 self._add_respondent(respondent, endpoints)
 
-    def handle_renewal(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
+    def handle_renewal(self, now: float, last_seqs: Mapping[int, int]) -> None:
         """Do nothing, because replies have no sequence numbers."""
 
     def counts(self) -> SubscriberCount:
