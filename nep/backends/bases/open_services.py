@@ -49,11 +49,13 @@ class OpenServices(Generic[S, C]):
             self.check_open()
             self.clients = (*self.clients, client)
 
-    def discard(self, closed: S | C) -> None:
-        """Remove a closed server, client or surveyor."""
+    def discard(self, closed: S | C) -> bool:
+        """Remove a closed server, client or surveyor; return False if it was removed already."""
         with self._lock:
+            count = len(self.servers) + len(self.clients)
             self.servers = tuple(each for each in self.servers if each is not closed)
             self.clients = tuple(each for each in self.clients if each is not closed)
+            return len(self.servers) + len(self.clients) < count
 
     def begin_close(self) -> None:
         """Reject queued and new calls."""

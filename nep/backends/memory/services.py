@@ -63,7 +63,7 @@ class MemoryServer(BaseServer):
     """Server whose calls clients append to its queue."""
 
     def __init__(
-        self, node_id: str, hub: ServiceHub, spec: ServerSpec, on_close: Callable[[MemoryServer], None]
+        self, node_id: str, hub: ServiceHub, spec: ServerSpec, on_close: Callable[[MemoryServer], object]
     ) -> None:
         super().__init__(spec)
         self._node_id = node_id
@@ -120,7 +120,7 @@ class MemoryClient(PendingCalls[_Call]):
         hub: ServiceHub,
         spec: ClientSpec,
         deadlines: Deadlines,
-        on_close: Callable[[MemoryClient], None],
+        on_close: Callable[[MemoryClient], object],
     ) -> None:
         super().__init__(spec, _Call, hub.lock)
         self._on_close = on_close

@@ -34,7 +34,9 @@ class _Call(PendingCall):
 class RosClient(PendingCalls[_Call]):
     """Client with its calls in flight."""
 
-    def __init__(self, process: RosProcess, spec: ClientSpec, on_close: Callable[[RosClient], None]) -> None:
+    def __init__(
+        self, process: RosProcess, spec: ClientSpec, on_close: Callable[[RosClient], object]
+    ) -> None:
         super().__init__(spec, _Call)
         self.process = process
         self.service = process.resolve_name(spec.service)

@@ -45,7 +45,9 @@ class _PendingReply:
 class RosServer(BaseServer):
     """Server with a call queue."""
 
-    def __init__(self, process: RosProcess, spec: ServerSpec, on_close: Callable[[RosServer], None]) -> None:
+    def __init__(
+        self, process: RosProcess, spec: ServerSpec, on_close: Callable[[RosServer], object]
+    ) -> None:
         super().__init__(spec)
         self.process = process
         self.service = process.resolve_name(spec.service)

@@ -398,7 +398,7 @@ class SharedContext:
         waker.close()
 
     @contextmanager
-    def removed(self, lock: threading.Lock, owners: set[T], owner: T) -> Iterator[bool]:
+    def removed(self, owner: T, discard: Callable[[T], bool]) -> Iterator[bool]:
         """Remove an owner of sockets from the open ones of its node, to close its sockets in the context.
 
         Yields False if it was removed already, so that only one thread closes the sockets. Until they are
@@ -406,19 +406,17 @@ class SharedContext:
         block the termination forever.
 
         Args:
-            lock: Lock that guards `owners`.
-            owners: Open owners of a node.
             owner: Owner to remove.
+            discard: Removes an owner; returns False if it was removed already.
         """
-        with lock:
-            is_removed = owner in owners
-            if is_removed:
-                owners.remove(owner)
-                self.acquire()
+        with _lock:
+            is_in_use = self.user_count > 0  # otherwise the node has closed everything
+            if is_in_use:
+                self.user_count += 1
         try:
-            yield is_removed
+            yield is_in_use and discard(owner)
         finally:
-            if is_removed:
+            if is_in_use:
                 self.release()
 
     def acquire(self) -> None:

@@ -218,13 +218,19 @@ class ZeromqTransport:
     def _publisher_closer(self, unregister: Callable[[], None]) -> Callable[[OwnedPublisher, float], None]:
         def close(publisher: OwnedPublisher, timeout_s: float) -> None:
             deadline = time.monotonic() + timeout_s
-            with self._shared.removed(self._lock, self._publishers, publisher) as is_removed:
+            with self._shared.removed(publisher, self._discard_publisher) as is_removed:
                 if is_removed:
                     unregister()
                     publisher.send_bye()
                     self._release_publisher(publisher, deadline)
 
         return close
+
+    def _discard_publisher(self, publisher: OwnedPublisher) -> bool:
+        with self._lock:
+            is_open = publisher in self._publishers
+            self._publishers.discard(publisher)
+            return is_open
 
     def _release_publisher(self, publisher: OwnedPublisher, deadline: float) -> None:
         publisher.finish(deadline)
@@ -488,7 +494,7 @@ class ZeromqTransport:
             subscriber.close()
         self._services.close(max(0.0, deadline - time.monotonic()))
         for publisher in publishers:
-            with self._shared.removed(self._lock, self._publishers, publisher) as is_removed:
+            with self._shared.removed(publisher, self._discard_publisher) as is_removed:
                 if is_removed:
                     self._release_publisher(publisher, deadline)
         for session in sessions:

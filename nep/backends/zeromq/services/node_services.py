@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
 
 import zmq
 
+from nep.backends.bases.open_services import OpenServices
 from nep.backends.connection import Direct
 from nep.backends.services import ClientSpec, ServerSpec
 from nep.backends.zeromq.io_thread import PollState, SharedContext
@@ -21,18 +20,15 @@ from nep.backends.zeromq.services.survey import SurveyClient
 from nep.backends.zeromq.services.tcp_server import TcpServer
 from nep.backends.zeromq.services.tcp_stream import TcpConnection
 from nep.backends.zeromq.sockets import bind
-from nep.errors import ClosedError, NepError
+from nep.errors import NepError
 from nep.i18n import _
 from nep.protocol.requests import PublisherRecord, SubscriberRecord
 from nep.protocol.service_wire import NATIVE, ORIGINAL, SERVICE_TYPE, Framing, topic_of
 from nep.system.addresses import endpoint_of, is_endpoint, resolve_address
 from nep.system.descriptors import check_free_descriptors
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
-
-class ZeromqServices:
+class ZeromqServices(OpenServices[RouterServer | TcpServer, SocketClient | SurveyClient]):
     """Servers, clients and surveyors of one node.
 
     Args:
@@ -45,14 +41,9 @@ class ZeromqServices:
     def __init__(
         self, shared: SharedContext, get_session: Callable[[str], MasterSession], node_name: str
     ) -> None:
+        super().__init__(node_name)
         self._shared = shared
         self._get_session = get_session
-        self._node_name = node_name
-        self._lock = threading.Lock()
-        self._servers: set[RouterServer | TcpServer] = set()
-        self._clients: set[SocketClient] = set()
-        self._surveyors: set[SurveyClient] = set()
-        self._is_closed = False
 
     # ---- servers
 
@@ -63,9 +54,9 @@ class ZeromqServices:
         session = self._get_session(spec.configuration.master)
         session.wait_for_address(spec.wait_s)
         server = self._new_server(spec, NATIVE, lambda: session.remove_publisher(spec.id, server.stats.calls))
-        with _release_on_error(server):
+        with self._released_on_error(server):
             endpoints = server.move(session.hosts)
-            self._add(server)
+            self._serve(server)
         record = PublisherRecord(
             spec.id, topic_of(spec.service), SERVICE_TYPE, SERVICE_TYPE, endpoints, number=spec.number
         )
@@ -80,28 +71,28 @@ class ZeromqServices:
         if direct.wire == "tcp":
             return self._create_tcp_server(spec, direct)
         server = self._new_server(spec, _framing(direct), lambda: None)
-        with _release_on_error(server):
+        with self._released_on_error(server):
             server.fixed_endpoints = (bind(server.socket, f"{direct.ip}:{direct.port}"),)
-            self._add(server)
+            self._serve(server)
         return server
 
     def _create_tcp_server(self, spec: ServerSpec, direct: Direct) -> TcpServer:
         def close(server: TcpServer, timeout_s: float) -> None:
             deadline = time.monotonic() + timeout_s
-            with self._shared.removed(self._lock, self._servers, server) as is_removed:
+            with self._shared.removed(server, self.discard) as is_removed:
                 if is_removed:
                     server.begin_close()
                     server.release(deadline)
 
         server = TcpServer(self._shared.io, spec, f"{direct.ip}:{direct.port}", close)
-        with _release_on_error(server):
-            self._add(server)
+        with self._released_on_error(server):
+            self._serve(server)
         return server
 
     def _new_server(self, spec: ServerSpec, framing: Framing, unregister: Callable[[], None]) -> RouterServer:
         def close(server: RouterServer, timeout_s: float) -> None:
             deadline = time.monotonic() + timeout_s
-            with self._shared.removed(self._lock, self._servers, server) as is_removed:
+            with self._shared.removed(server, self.discard) as is_removed:
                 if is_removed:
                     server.begin_close()
                     self._shared.io.remove(server)
@@ -112,18 +103,27 @@ class ZeromqServices:
         socket = self._shared.socket(zmq.ROUTER, f"a server of '{spec.service}'")
         return RouterServer(socket, spec, framing, self._shared.io.serve_soon, unregister, close)
 
-    def _add(self, owner: RouterServer | TcpServer | SocketClient) -> None:
-        with self._lock:
-            self._check_open_locked()
-            if isinstance(owner, SocketClient):
-                self._clients.add(owner)
-            else:
-                self._servers.add(owner)
-            self._shared.io.add(owner)  # before `close` can remove the owner, which acquires this lock first
+    def _serve(self, owner: RouterServer | TcpServer | SocketClient) -> None:
+        # In this order: `close` may remove the owner as soon as it was added. Call in `_released_on_error`.
+        self.check_open()
+        self._shared.io.add(owner)
+        if isinstance(owner, SocketClient):
+            self.add_client(owner)
+        else:
+            self.add_server(owner)
 
-    def _check_open_locked(self) -> None:
-        if self._is_closed:
-            raise ClosedError(f"node '{self._node_name}'")
+    @contextmanager
+    def _released_on_error(self, owner: RouterServer | TcpServer | SocketClient) -> Iterator[None]:
+        # A socket left open would block the end of the program.
+        try:
+            yield
+        except BaseException:
+            self._shared.io.remove(owner)
+            if isinstance(owner, SocketClient):
+                owner.release()
+            else:
+                owner.release(0.0)
+            raise
 
     # ---- clients
 
@@ -155,7 +155,7 @@ class ZeromqServices:
         session.wait_for_address(spec.wait_s)
 
         def close(surveyor: SurveyClient) -> None:
-            with self._shared.removed(self._lock, self._surveyors, surveyor) as is_removed:
+            with self._shared.removed(surveyor, self.discard) as is_removed:
                 if is_removed:
                     session.remove_subscriber(spec.id)
                     surveyor.release()
@@ -164,9 +164,7 @@ class ZeromqServices:
             return self._new_client(spec, NATIVE, lambda: None, None, endpoint)
 
         surveyor = SurveyClient(spec, new_client, close)
-        with self._lock:
-            self._check_open_locked()
-            self._surveyors.add(surveyor)
+        self.add_client(surveyor)
         try:
             record = SubscriberRecord(spec.id, topic_of(spec.service), SERVICE_TYPE, spec.number)
             surveyor.connect(session.add_subscriber(record, surveyor, spec.wait_s).publishers)
@@ -197,7 +195,7 @@ class ZeromqServices:
         is_tcp: bool = False,
     ) -> SocketClient:
         def close(client: SocketClient) -> None:
-            with self._shared.removed(self._lock, self._clients, client) as is_removed:
+            with self._shared.removed(client, self.discard) as is_removed:
                 if is_removed:
                     unregister()
                     self._shared.io.remove(client)
@@ -218,51 +216,16 @@ class ZeromqServices:
             query_services=query_services,
             endpoint=endpoint,
         )
-        with _release_on_error(client):
-            self._add(client)
+        with self._released_on_error(client):
+            self._serve(client)
         return client
-
-    # ---- closing
-
-    def begin_close(self) -> None:
-        """Reject queued and new calls, so that waiting clients are notified."""
-        with self._lock:
-            self._is_closed = True
-            servers = tuple(self._servers)
-        for server in servers:
-            server.begin_close()
-
-    def close(self, timeout_s: float) -> None:
-        """Close all servers, clients and surveyors; replies are flushed within `timeout_s` seconds."""
-        deadline = time.monotonic() + timeout_s
-        with self._lock:
-            surveyors, clients, servers = tuple(self._surveyors), tuple(self._clients), tuple(self._servers)
-        for surveyor in surveyors:
-            surveyor.close()
-        for client in clients:
-            client.close()
-        for server in servers:
-            server.close(max(0.0, deadline - time.monotonic()))
 
     @property
     def endpoints(self) -> tuple[str, ...]:
         """Endpoints of all servers and connections. Acquires no lock."""
-        bound = (endpoint for server in self._servers for endpoint in server.endpoints)
-        return (*bound, *(client.endpoint for client in self._clients))
+        bound = (endpoint for server in self.servers for endpoint in server.endpoints)
+        return (*bound, *(each.endpoint for each in self.clients if isinstance(each, SocketClient)))
 
 
 def _framing(direct: Direct) -> Framing:
     return ORIGINAL if direct.wire == "original" else NATIVE
-
-
-@contextmanager
-def _release_on_error(owner: RouterServer | TcpServer | SocketClient) -> Iterator[None]:
-    # A socket left open would block the end of the program.
-    try:
-        yield
-    except BaseException:
-        if isinstance(owner, SocketClient):
-            owner.release()
-        else:
-            owner.release(0.0)
-        raise
