@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 from nep.backends.connection import Configuration
 from nep.errors import PluginsMissingError, UnknownBackendError
@@ -104,33 +104,19 @@ class Wakeable(Protocol):
         """Wake the waiting thread. Thread-safe and non-blocking, even while the caller holds locks."""
 
 
-class PublishHooks(NamedTuple):
-    """Arguments of `SupportsFastPublish.fast_publish_function`.
-
-    Attributes:
-        raw_type: Payload type that is sent unchanged, without encoding; None if there is none.
-        encode: Encodes payloads of other types; if it raises, the payload is passed to `fallback`.
-        on_null: Called with each payload whose encoding contains ``null``; None to skip the check.
-        fallback: Full publish method. Also used with ``strict=True``, while the topic has no subscribers, and
-            after the publisher was closed.
-    """
-
-    raw_type: type | None
-    encode: Callable[[Any], bytes]
-    on_null: Callable[[Any], object] | None
-    fallback: Callable[..., object]
-
-
 @runtime_checkable
-class SupportsFastPublish(Protocol):
-    """Optional interface of a `PublisherTransport`: a fast path for publishing."""
+class SupportsSendBytes(Protocol):
+    """Optional interface of a `PublisherTransport`: a fast path for payloads without an extension."""
 
-    def fast_publish_function(self, hooks: PublishHooks) -> Callable[..., None]:
-        """Return a publish function with minimal call overhead, which never blocks.
+    is_closed: bool
+    """True after the publisher was closed."""
+    has_subscribers: bool
+    """True if any subscriber is connected."""
+    problem: str
+    """Reason why the newest payload was rejected; "" if it was encoded."""
 
-        Args:
-            hooks: Encoder and fallbacks for the publish function.
-        """
+    def send_bytes(self, data: bytes) -> None:
+        """Send an encoded payload to all subscribers. Never blocks."""
 
 
 class PublisherTransport(Protocol):

@@ -17,13 +17,12 @@ from typing import TYPE_CHECKING, Any
 from nep.backends.base import (
     PublisherSpec,
     PublisherTransport,
-    PublishHooks,
-    SupportsFastPublish,
+    SupportsSendBytes,
     SupportsSubscriberIds,
 )
 from nep.errors import ClosedError, EncodeError, WireError
 from nep.i18n import _
-from nep.messages.codecs import JsonEncoder, fast_encoder
+from nep.messages.codecs import NULL, JsonEncoder, fast_encoder
 from nep.messages.encoded import Encoded, new_encoded
 from nep.nodes.arguments import check_time_limit
 from nep.protocol.wire import extension_part
@@ -76,8 +75,12 @@ class Publisher:
         self._rejected = RejectedPayloads(spec.topic, spec.codec.encode, transport.report)
         self._is_latched = spec.is_latched
         self._is_closed = False
-        if isinstance(transport, SupportsFastPublish) and (encode := fast_encoder(spec.codec)) is not None:
-            self._install_fast_publish(transport, encode)
+        self._encode_fast = fast_encoder(spec.codec)
+        self._raw_type = bytes if spec.codec.name == "bytes" else None
+        """Type of payloads that are sent unchanged, without encoding; None if there is none."""
+        self._fast_transport = (
+            transport if isinstance(transport, SupportsSendBytes) and self._encode_fast is not None else None
+        )
 
     @property
     def topic(self) -> str:
@@ -158,6 +161,24 @@ class Publisher:
                 and the payload can't be encoded.
             ClosedError: The publisher is closed.
         """
+        fast_transport, encode = self._fast_transport, self._encode_fast
+        if (
+            fast_transport is not None
+            and encode is not None
+            and fast_transport.has_subscribers
+            and not (strict or fast_transport.is_closed or fast_transport.problem)
+            and type(payload) is not Encoded
+            and not self._generation.is_inherited
+        ):
+            try:
+                data: Any = payload if type(payload) is self._raw_type else encode(payload)
+            except Exception:  # noqa: BLE001, S110 - a payload may be of any class; it is sent or reported below
+                pass
+            else:
+                if self._json_encoder is not None and data.rfind(NULL) >= 0:
+                    self._json_encoder.check_for_nan(payload)
+                fast_transport.send_bytes(data)
+                return
         if strict or self._is_strict:
             self._publish_strict(payload)
             return
@@ -197,14 +218,6 @@ class Publisher:
             self._transport.send(encoded_payload)
         else:
             self._transport.skip()
-
-    def _install_fast_publish(self, transport: SupportsFastPublish, encode: Callable[[Any], bytes]) -> None:
-        # Replaces self.publish; payloads that the fast path can't handle fall back to Publisher.publish.
-        on_null = None if self._json_encoder is None else self._json_encoder.check_for_nan
-        kind = bytes if self._spec.codec.name == "bytes" else None
-        fast_publish = transport.fast_publish_function(PublishHooks(kind, encode, on_null, self.publish))
-        fast_publish.__doc__ = Publisher.publish.__doc__
-        setattr(self, "publish", fast_publish)  # noqa: B010 - mypy rejects the assignment to a method
 
     def publish_bytes(self, data: bytes | memoryview, extension: Mapping[str, object] | None = None) -> None:
         """Send data that is already encoded. Thread-safe.

@@ -7,16 +7,7 @@ docs/adr/0009-one-part.md.
 
 from __future__ import annotations
 
-import threading
-import time
-from collections.abc import Callable
-from typing import Any, Protocol
-
-from nep.backends.base import PublishHooks
-from nep.messages.codecs import NULL
-from nep.messages.encoded import Encoded
 from nep.protocol.batch import MAX_BATCH_MESSAGES
-from nep.system.forks import current_generation
 
 BATCH_WINDOW_NS = 20_000
 MAX_DELAY_NS = 100_000
@@ -27,29 +18,6 @@ MAX_BATCHED_BYTES = 16_384
 """Maximum size in bytes of a message in a batch. Copying larger messages would cost more than it saves."""
 _BURST_CHECK_INTERVAL_S = 500e-6
 """Interval in seconds of the I/O thread's checks while the publisher itself sends full batches."""
-
-
-_time_ns = time.time_ns
-
-
-class BatchOwner(Protocol):
-    """Interface of a publisher to its batch."""
-
-    is_closed: bool
-    """True after the publisher was closed."""
-    has_subscribers: bool
-    """True if any subscriber is connected."""
-    problem: str
-    """Reason why the newest payload was rejected; "" if it was encoded."""
-
-    def send_now(self, data: bytes) -> None:
-        """Send pending messages, then the message with payload `data`."""
-
-    def flush_locked(self) -> None:
-        """Send pending messages. Call with the lock held."""
-
-    def flush_soon_locked(self) -> None:
-        """Let the I/O thread send pending messages soon. Call with the lock held."""
 
 
 class PendingBatch:
@@ -98,63 +66,6 @@ class PendingBatch:
         """
         if self.is_allowed:
             self.until_ns = stamp_ns + BATCH_WINDOW_NS
-
-    def publish_function(
-        self, hooks: PublishHooks, sender: BatchOwner, lock: threading.Lock
-    ) -> Callable[..., None]:
-        """Return the function that implements `Publisher.publish`.
-
-        The function is one closure, because nearly all of the time for a small message is spent in it.
-
-        Args:
-            hooks: Functions for encoding and for the slow path.
-            sender: Sending end of the publisher.
-            lock: Lock of `sender`.
-        """
-        raw_type, encode, on_null, fallback = hooks
-        batch, pending, append, send_now = self, self.pending, self.pending.append, sender.send_now
-        generation = current_generation()
-
-        def publish(payload: Any, *, strict: bool = False) -> None:  # noqa: ANN401 - as `Publisher.publish`
-            if strict:
-                fallback(payload, strict=True)
-                return
-            stamp_ns = _time_ns()
-            if (
-                generation.is_inherited
-                or sender.is_closed
-                or sender.problem
-                or not sender.has_subscribers
-                or type(payload) is Encoded
-            ):
-                fallback(payload)
-                return
-            try:
-                data: Any = payload if type(payload) is raw_type else encode(payload)
-            except Exception:  # noqa: BLE001 - a payload may be of any class; `fallback` sends or reports it
-                fallback(payload)
-                return
-            if on_null is not None and data.rfind(NULL) >= 0:
-                on_null(payload)
-            if stamp_ns >= batch.until_ns or len(data) >= MAX_BATCHED_BYTES:
-                send_now(data)
-                return
-            append((data, stamp_ns))
-            count = len(pending)
-            if count >= MAX_PENDING_MESSAGES or count * len(data) >= FULL_BATCH_BYTES:
-                with lock:
-                    sender.flush_locked()
-                batch.has_sent_full_batch = True
-                return
-            if count == 1:
-                batch.flush_deadline_ns = stamp_ns + MAX_DELAY_NS
-            if not batch.is_flush_scheduled:
-                with lock:
-                    sender.flush_soon_locked()
-            until_ns, deadline_ns = stamp_ns + BATCH_WINDOW_NS, batch.flush_deadline_ns
-            batch.until_ns = until_ns if until_ns < deadline_ns else deadline_ns  # noqa: FURB136 - takes half the time of min
-
-        return publish
 
     def pop_batch(self) -> list[tuple[bytes, int]]:
         """Remove and return up to `MAX_BATCH_MESSAGES` pending messages, oldest first.

@@ -12,16 +12,23 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
-from typing import NoReturn, cast
+from typing import cast
 
 import zmq
 
-from nep.backends.base import PublisherSpec, PublishHooks
+from nep.backends.base import PublisherSpec
 from nep.backends.bases.rejections import RejectionCounter
 from nep.backends.zeromq.bindings import Bindings
 from nep.backends.zeromq.byte_window import ACK_INTERVAL_BYTES, TRACKING_INTERVAL_BYTES, Backlog
 from nep.backends.zeromq.io_thread import Pollable, PollState
-from nep.backends.zeromq.pending_batch import MAX_BATCHED_BYTES, PendingBatch
+from nep.backends.zeromq.pending_batch import (
+    BATCH_WINDOW_NS,
+    FULL_BATCH_BYTES,
+    MAX_BATCHED_BYTES,
+    MAX_DELAY_NS,
+    MAX_PENDING_MESSAGES,
+    PendingBatch,
+)
 from nep.backends.zeromq.shared.memory import MIN_SHARED_BYTES, can_share, start_sharing
 from nep.backends.zeromq.shared.payloads import SharedPayloads
 from nep.backends.zeromq.sockets import Part, RemoteConnection, Socket, set_send_high_water_mark, to_sendable
@@ -65,10 +72,6 @@ ZMQ_FD.
 """
 _IO_CHECK_INTERVAL_S = 0.02
 _BYE_RETRY_S = 0.05
-
-
-def _reject_payload(payload: object) -> NoReturn:
-    raise TypeError(payload)
 
 
 class HandshakePublisher:
@@ -172,8 +175,6 @@ class NativePublisher(HandshakePublisher):
         self._lock = threading.Lock()
         super().__init__(threading.Condition(self._lock), self._subscriptions.counts_at_hello)
         self.fd = int(socket.getsockopt(zmq.FD))
-        bytes_hooks = PublishHooks(bytes, _reject_payload, None, self.send_now)
-        self._send_bytes = self._batch.publish_function(bytes_hooks, self, self._lock)
 
     @property
     def count(self) -> int:
@@ -251,17 +252,34 @@ class NativePublisher(HandshakePublisher):
         """
         data, extension_fields = encoded
         if extension_fields is None and type(data) is bytes:
-            self._send_bytes(data)
+            self.send_bytes(data)
         else:
             self._send_now(data, extension_fields)
 
-    def fast_publish_function(self, hooks: PublishHooks) -> Callable[..., None]:
-        """Return the fast publish function. See `nep.backends.base.SupportsFastPublish`."""
-        return self._batch.publish_function(hooks, self, self._lock)
+    def send_bytes(self, data: bytes) -> None:
+        """Publish a message without extension: alone, or in a batch if the previous one was just published.
 
-    def send_now(self, data: bytes) -> None:
-        """Send pending messages, then the message with payload `data`."""
-        self._send_now(data, None)
+        Raises `ClosedError` if the publisher is closed.
+        """
+        batch, size, stamp_ns = self._batch, len(data), _time_ns()
+        if stamp_ns >= batch.until_ns or size >= MAX_BATCHED_BYTES or self.is_closed or self.problem:
+            self._send_now(data, None)
+            return
+        pending = batch.pending
+        pending.append((data, stamp_ns))
+        count = len(pending)
+        if count >= MAX_PENDING_MESSAGES or count * size >= FULL_BATCH_BYTES:
+            with self._lock:
+                self.flush_locked()
+            batch.has_sent_full_batch = True
+            return
+        if count == 1:
+            batch.flush_deadline_ns = stamp_ns + MAX_DELAY_NS
+        if not batch.is_flush_scheduled:
+            with self._lock:
+                self.flush_soon_locked()
+        until_ns, deadline_ns = stamp_ns + BATCH_WINDOW_NS, batch.flush_deadline_ns
+        batch.until_ns = until_ns if until_ns < deadline_ns else deadline_ns  # noqa: FURB136 - takes half the time of min
 
     def _send_now(self, payload: bytes | memoryview, extension_fields: Mapping[str, object] | None) -> None:
         data: Part = payload

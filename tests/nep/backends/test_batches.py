@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import threading
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -12,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import nep
-from nep.backends.base import PublishHooks
+from nep.backends.base import PublisherSpec
+from nep.backends.connection import Hybrid
 from nep.backends.zeromq.pending_batch import (
     BATCH_WINDOW_NS,
     MAX_DELAY_NS,
@@ -21,6 +21,7 @@ from nep.backends.zeromq.pending_batch import (
 )
 from nep.errors import ClosedError, WireError
 from nep.masters.master import Master
+from nep.messages.codecs import codec_for
 from nep.messages.encoded import Encoded
 from nep.protocol import wire
 from nep.protocol.batch import BATCH, MAX_BATCH_MESSAGES, encode_batch, parse_entries
@@ -326,22 +327,29 @@ def test_any_batch_bytes_are_parsed_or_rejected_with_a_reason(body: bytes) -> No
         assert read[-1].end == len(body)
 
 
-class _HeardWay:
+class _RecordingTransport:
     has_subscribers = True
     is_closed = False
     problem = ""
 
-    def send_now(self, data: bytes) -> None: ...
+    def __init__(self) -> None:
+        self.sent: list[Encoded | bytes] = []
 
-    def flush_locked(self) -> None: ...
+    def send(self, encoded: Encoded) -> None:
+        self.sent.append(encoded)
 
-    def flush_soon_locked(self) -> None: ...
+    def send_bytes(self, data: bytes) -> None:
+        self.sent.append(data)
+
+    def report(self, problem: str) -> None:
+        """Do nothing."""
 
 
-def test_encoded_payload_is_not_encoded_again() -> None:
-    encoded: list[object] = []
-    passed: list[object] = []
-    asked = PublishHooks(None, lambda payload: encoded.append(payload) or b"", None, passed.append)
-    publish = PendingBatch(is_enabled=False).publish_function(asked, _HeardWay(), threading.Lock())
-    publish(Encoded(b"1"))
-    assert (encoded, passed) == ([], [Encoded(b"1")])
+def test_encoded_payload_is_sent_unchanged_and_others_as_bytes() -> None:
+    transport = _RecordingTransport()
+    spec = PublisherSpec(1, "t", "json", codec_for("json"), False, Hybrid("127.0.0.1:0"), None)
+    publisher = nep.Publisher(transport, spec)  # type: ignore[arg-type]
+    publisher.publish(Encoded(b"1"))
+    publisher.publish(1)
+    publisher.publish(2, strict=True)
+    assert transport.sent == [Encoded(b"1"), b"1", Encoded(b"2")]
