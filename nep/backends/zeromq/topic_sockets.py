@@ -123,14 +123,18 @@ class ThreadGroup:
         self._closing.set()
         self._interrupt.wake()
 
+    def _polled(self) -> set[int]:
+        with self._lock:
+            return {self._interrupt.fd, *(self._fds - self._readable)}
+
     def _run(self) -> None:
         while not self._closing.is_set():
-            with self._lock:
-                polled = [(fd, _POLLIN) for fd in (self._interrupt.fd, *(self._fds - self._readable))]
+            polled = self._polled()
             try:
-                readable = {fd for fd, _events in zmq.zmq_poll(polled, -1)}
-            except (OSError, ValueError, zmq.ZMQError):  # one was closed, or there are too many
-                self._closing.wait(_RETRY_S)
+                readable = {fd for fd, _events in zmq.zmq_poll([(fd, _POLLIN) for fd in polled], -1)}
+            except (OSError, ValueError, zmq.ZMQError):  # a removed one was closed, or there are too many
+                if polled == self._polled():
+                    self._closing.wait(_RETRY_S)
                 continue
             self._interrupt.clear()
             with self._lock:
