@@ -11,8 +11,8 @@ import logging
 from collections.abc import Callable
 from functools import lru_cache
 
-from PySide6.QtCore import QByteArray, QPoint, QPointF, QRect, QRectF, QSize, QSizeF, Qt
-from PySide6.QtGui import QColor, QIcon, QIconEngine, QPainter, QPixmap
+from PySide6.QtCore import QByteArray, QPointF, QRect, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QGuiApplication, QIcon, QIconEngine, QPainter, QPixmap
 from PySide6.QtSvg import QSvgRenderer
 
 from app import resources
@@ -94,14 +94,26 @@ def paint_icon(
 
 
 @lru_cache(maxsize=256)
-def _cached_pixmap(name: str, side: float, rgba: int, ratio: float) -> QPixmap:
-    pixmap = QPixmap(round(side * ratio), round(side * ratio))
+def _cached_pixmap(
+    name: str, width: float, height: float, rgba: int, ratio: float, is_filled: bool = False
+) -> QPixmap:
+    pixmap = QPixmap(round(width * ratio), round(height * ratio))
     pixmap.setDevicePixelRatio(ratio)
     pixmap.fill(Qt.GlobalColor.transparent)
     painter = QPainter(pixmap)
-    paint_icon(painter, QRectF(0, 0, side, side), name, QColor.fromRgba(rgba))
+    icon_rect = _leading_square(QRectF(0, 0, width, height))
+    paint_icon(painter, icon_rect, name, QColor.fromRgba(rgba), is_filled=is_filled)
     painter.end()
     return pixmap
+
+
+def _leading_square(rect: QRectF) -> QRectF:
+    # A wider rectangle has space for the gap between the icon and a text.
+    side = min(rect.width(), rect.height())
+    square = QRectF(rect.left(), rect.center().y() - side / 2, side, side)
+    if QGuiApplication.isRightToLeft():
+        square.moveRight(rect.right())
+    return square
 
 
 def paint_cached_icon(painter: QPainter, rect: QRectF, name: str, colour: QColor) -> None:
@@ -111,40 +123,39 @@ def paint_cached_icon(painter: QPainter, rect: QRectF, name: str, colour: QColor
     """
     ratio = painter.device().devicePixelRatioF()
     position = QPointF(round(rect.x() * ratio) / ratio, round(rect.y() * ratio) / ratio)
-    painter.drawPixmap(position, _cached_pixmap(name, rect.width(), colour.rgba(), ratio))
+    painter.drawPixmap(position, _cached_pixmap(name, rect.width(), rect.width(), colour.rgba(), ratio))
 
 
 @guard  # not a QObject
 class IconEngine(QIconEngine):
-    """Icon engine that paints an icon in the colour of the current mode, such as normal or disabled."""
+    """Icon engine that paints an icon in the colour of the current mode, such as normal or disabled.
 
-    def __init__(self, name: str, colour: Callable[[QIcon.Mode, QIcon.State], QColor]) -> None:
+    In a size that is wider than high, the icon is at the leading edge.
+    """
+
+    def __init__(
+        self, name: str, colour: Callable[[QIcon.Mode, QIcon.State], QColor], *, is_filled: bool = False
+    ) -> None:
         # `colour` is called at each paint, so that a new theme needs no new icon.
         super().__init__()
         _source(name)
         self._name = name
         self._colour = colour
+        self._is_filled = is_filled
 
     def paint(self, painter: QPainter, rect: QRect, mode: QIcon.Mode, state: QIcon.State) -> None:
-        side = min(rect.width(), rect.height())
-        icon_rect = QRectF(0, 0, side, side)
-        icon_rect.moveCenter(QRectF(rect).center())
-        paint_icon(painter, icon_rect, self._name, self._colour(mode, state))
+        icon_rect, colour = _leading_square(QRectF(rect)), self._colour(mode, state)
+        paint_icon(painter, icon_rect, self._name, colour, is_filled=self._is_filled)
 
     def pixmap(self, size: QSize, mode: QIcon.Mode, state: QIcon.State) -> QPixmap:
         return self.scaledPixmap(size, mode, state, 1.0)
 
     def scaledPixmap(self, size: QSize, mode: QIcon.Mode, state: QIcon.State, scale: float) -> QPixmap:
-        pixmap = QPixmap((QSizeF(size) * scale).toSize())
-        pixmap.setDevicePixelRatio(scale)
-        pixmap.fill(Qt.GlobalColor.transparent)
-        painter = QPainter(pixmap)
-        self.paint(painter, QRect(QPoint(0, 0), size), mode, state)
-        painter.end()
-        return pixmap
+        rgba = self._colour(mode, state).rgba()
+        return _cached_pixmap(self._name, size.width(), size.height(), rgba, scale, self._is_filled)
 
     def key(self) -> str:
         return f"nep:{self._name}"
 
     def clone(self) -> QIconEngine:
-        return IconEngine(self._name, self._colour)
+        return IconEngine(self._name, self._colour, is_filled=self._is_filled)

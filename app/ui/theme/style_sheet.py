@@ -1,13 +1,13 @@
 """Style sheet of the application, built from a theme, with rules by class and dynamic property.
 
 The font and the colour of labels are set by the properties ``kind`` and ``role``, see
-`app.ui.widgets.label`.
+`app.ui.widgets.label`; those of buttons by ``metrics`` and ``kind``, see `app.ui.widgets.Button`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal, Protocol
+from typing import Literal, NamedTuple, Protocol
 
 from app.ui.theme.tokens import TextKind
 
@@ -18,6 +18,39 @@ LABEL_ROLES = (
 
 EXTRA_KINDS = {"titleLarge": (14.0, 600), "empty": (17.0, 600), "card": (15.0, 600), "lead": (15.0, 400)}
 """Size in px and weight of kinds of labels that the tokens don't define."""
+
+
+class ButtonColours(NamedTuple):
+    """Colour roles of a kind of button; None for no fill or no border."""
+
+    fill: str | None
+    hovered: str | None
+    pressed: str | None
+    border: str | None
+    text: str
+
+
+BUTTON_COLOURS: Mapping[str, ButtonColours] = {
+    "plain": ButtonColours("panel", "hover", "pressed", "borderStrong", "text"),
+    "toggle": ButtonColours("panel", "hover", "pressed", "borderStrong", "text"),
+    "ghost": ButtonColours(None, "hover", "pressed", None, "text"),
+    "link": ButtonColours(None, None, None, None, "accentText"),
+    "primary": ButtonColours("accent", "accentHover", "accentHover", None, "onAccent"),
+    "run": ButtonColours("run", "runHover", "runHover", None, "onRun"),
+    "stop": ButtonColours("stop", "stopHover", "stopHover", None, "onStop"),
+    "recording": ButtonColours("pressed", "pressed", "pressed", "borderStrong", "error"),
+    "replay": ButtonColours("accentTint", "accentTint", "accentTint", "accent", "accentText"),
+}
+"""Colours of buttons by kind."""
+
+# kind of text, weight and radius of buttons by the property ``metrics``
+_BUTTON_FONTS = {
+    "small": ("body", 500, "small"),
+    "normal": ("body", 500, "control"),
+    "form": ("label", None, "control"),
+    "large": ("button", None, "large"),
+    "link": ("title", None, "small"),
+}
 
 
 class ThemeValues(Protocol):
@@ -72,6 +105,19 @@ QMenu::icon {{ padding-left: 8px; }}
 QMenu::separator {{ height: 1px; background: {border}; margin: 4px 6px; }}
 QMenu::scroller {{ height: 22px; background: transparent; }}
 QMenu::indicator {{ width: 16px; height: 16px; padding-left: 8px; }}
+
+Button {{ padding: 0 3px; }}
+Button[kind="toggle"]:checked:enabled {{
+    background: {selected}; border-color: {accent}; color: {selectedText};
+}}
+Button[kind="link"] {{ padding: 0; }}
+Button[kind="link"]:hover {{ text-decoration: underline; }}
+MenuButton {{ padding-right: {menu_button_padding}px; }}
+IconButton {{ border: none; border-radius: {small}px; background: transparent; padding: 0; }}
+IconButton:hover {{ background: {hover}; }}
+IconButton:pressed {{ background: {pressed}; }}
+IconButton:checked {{ background: {accentTint}; }}
+IconButton[dropTarget="true"] {{ background: {accentTint}; border: 2px solid {accent}; }}
 
 QLineEdit, QPlainTextEdit, QTextEdit {{
     background: {field}; color: {text}; border: 1px solid {controlBorder}; border-radius: {control}px;
@@ -139,6 +185,32 @@ def _label_rules(theme: ThemeValues) -> str:
     return "\n".join(rules)
 
 
+def _button_rules(theme: ThemeValues) -> str:
+    def background(role: str | None) -> str:
+        return f"background: {theme.hex(role) if role else 'transparent'};"
+
+    rules = []
+    for name, (kind_name, weight, radius) in _BUTTON_FONTS.items():
+        kind = theme.text_kinds()[kind_name]
+        rules.append(
+            f'Button[metrics="{name}"] {{ border-radius: {theme.radius(radius)}px;'
+            f" font-size: {round(theme.scaled(kind.size_px))}px; font-weight: {weight or kind.weight}; }}"
+        )
+    for name, colours in BUTTON_COLOURS.items():
+        selector = f'Button[kind="{name}"]'
+        border = f"border: 1px solid {theme.hex(colours.border)};" if colours.border else "border: none;"
+        disabled_border = "border" if colours.border or colours.fill else None
+        rules += (
+            f"{selector} {{ {background(colours.fill)} color: {theme.hex(colours.text)}; {border} }}",
+            f"{selector}:hover {{ {background(colours.hovered)} }}",
+            f"{selector}:pressed, {selector}:checked {{ {background(colours.pressed)} }}",
+            f"{selector}:disabled {{ background: transparent; color: {theme.hex('textDisabled')};"
+            + (f" border: 1px solid {theme.hex(disabled_border)};" if disabled_border else "")
+            + " }",
+        )
+    return "\n".join(rules)
+
+
 class _Roles(dict[str, str]):
     """Mapping of role names to values, with the theme's colours as defaults."""
 
@@ -158,6 +230,7 @@ def build(theme: ThemeValues) -> str:
         control=str(theme.radius("control")),
         panel_radius=str(theme.radius("panel")),
         field=theme.hex("sunken") if theme.is_dark else theme.hex("panel"),
+        menu_button_padding=str(round(theme.scaled(14)) + 9),
         small_text=str(round(theme.scaled(theme.text_kinds()["small"].size_px))),
     )
-    return STYLE_SHEET_TEMPLATE.format_map(roles) + _label_rules(theme)
+    return _button_rules(theme) + STYLE_SHEET_TEMPLATE.format_map(roles) + _label_rules(theme)

@@ -1,4 +1,4 @@
-"""Buttons that paint icon and text themselves, because the gap between both is fixed in the Fusion style.
+"""Buttons. Qt paints them with the application's style sheet, except Stop and the buttons of some panels.
 
 Run, Pause, Step and Stop keep their positions and widths in every state.
 """
@@ -8,29 +8,30 @@ from __future__ import annotations
 from typing import Literal, NamedTuple
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QFont, QKeyEvent, QPainter, QPaintEvent, QResizeEvent
-from PySide6.QtWidgets import QAbstractButton, QSizePolicy, QWidget
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QKeyEvent, QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QPushButton,
+    QSizePolicy,
+    QStyleOptionButton,
+    QStyleOptionToolButton,
+    QToolButton,
+    QWidget,
+)
 
 from app.ui.text import plain
 from app.ui.text.numbers import tip_with_key
 from app.ui.theme.icons import paint_icon
+from app.ui.theme.style_sheet import BUTTON_COLOURS
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.keyboard import has_no_modifiers
 from nep.i18n import _
 
-Kind = Literal["plain", "primary", "ghost", "run", "stop"]
-Size = Literal["small", "normal", "form", "large"]
-# by kind: fill, hovered fill, pressed fill, border, text
-_COLOURS: dict[str, tuple[str | None, str | None, str | None, str | None, str]] = {
-    "plain": ("panel", "hover", "pressed", "borderStrong", "text"),
-    "ghost": (None, "hover", "pressed", None, "text"),
-    "primary": ("accent", "accentHover", "accentHover", None, "onAccent"),
-    "run": ("run", "runHover", "runHover", None, "onRun"),
-    "stop": ("stop", "stopHover", "stopHover", None, "onStop"),
-}
-ARROW_SIZE = 16
+Kind = Literal["plain", "primary", "ghost", "run", "stop", "toggle", "link", "recording", "replay"]
+Size = Literal["small", "normal", "form", "large", "link"]
 CHEVRON, CHEVRON_GAP = 14, 6
+QT_ICON_GAP = 2  # px that Qt adds between the icon and the text of a QPushButton
 BarName = Literal["runBar", "toolBar", "appBar"]
 RUN_WIDTH = 112
 ICON_ONLY_WIDTH = 56
@@ -52,7 +53,9 @@ _METRICS: dict[str, _ButtonMetrics] = {
     "normal": _ButtonMetrics(32, "body", 16, 8, 12, "control"),
     "form": _ButtonMetrics(36, "label", 16, 8, 14, "control"),
     "large": _ButtonMetrics(44, "button", 20, 10, 18, "large"),
+    "link": _ButtonMetrics(24, "title", 16, 6, 1, "small"),
 }
+_MIN_PADDING = 5  # px beside the contents of a button that is narrower than its size hint
 
 
 def assign_command(widget: QWidget, command: str) -> None:
@@ -60,11 +63,37 @@ def assign_command(widget: QWidget, command: str) -> None:
     widget.setProperty("command", command)
 
 
+def set_up_button(button: QAbstractButton, theme: Theme, radius: str) -> None:
+    """Set the policies for focus and size, and the radius of the focus ring.
+
+    Args:
+        button: Button.
+        theme: Theme.
+        radius: Name of the corner radius in the theme.
+    """
+    button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+    button.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+    button.setProperty("focusRadius", theme.radius(radius))
+    theme.changed.connect(button.updateGeometry)
+
+
+def click_on_enter(button: QAbstractButton, event: QKeyEvent) -> bool:
+    """Click a button on Enter, ignoring auto-repeat; return True if the key was handled.
+
+    Qt does so only for a QPushButton with `autoDefault`, which also repeats the click while Enter is held.
+    """
+    if event.key() not in {Qt.Key.Key_Return, Qt.Key.Key_Enter} or not has_no_modifiers(event):
+        return False
+    if not event.isAutoRepeat():
+        button.click()
+    return True
+
+
 class PaintedButton(QAbstractButton):
     """Base class of painted buttons. Subclasses implement `paint_button`.
 
-    Buttons accept the keyboard focus, are repainted on hover and press, and scale with the text size of
-    the theme. The accessible name is the text, unless another one is set.
+    The buttons are repainted on hover and press, and scale with the text size of the theme. The accessible
+    name is the text, unless another one is set.
     """
 
     elides_text = False
@@ -84,11 +113,8 @@ class PaintedButton(QAbstractButton):
         self._theme = theme
         self.set_text(text)
         self.setCheckable(checkable)
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.setProperty("focusRadius", theme.radius(radius))
+        set_up_button(self, theme, radius)
         self.setAttribute(Qt.WidgetAttribute.WA_Hover)
-        theme.changed.connect(self.updateGeometry)
         self._is_drop_target = False
 
     @property
@@ -128,15 +154,8 @@ class PaintedButton(QAbstractButton):
             paint.set_elision_tooltip(self, self.text())
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Click on Enter as well as on Space, ignoring auto-repeat.
-
-        Qt does so only for a QPushButton with `autoDefault`, which also repeats the click while Enter
-        is held.
-        """
-        if event.key() not in {Qt.Key.Key_Return, Qt.Key.Key_Enter} or not has_no_modifiers(event):
+        if not click_on_enter(self, event):
             super().keyPressEvent(event)
-        elif not event.isAutoRepeat():
-            self.click()
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
@@ -158,10 +177,11 @@ class PaintedButton(QAbstractButton):
         """
 
 
-class Button(PaintedButton):
-    """Button with a text and an optional icon."""
+class Button(QPushButton):
+    """Button with a text and an optional icon. A text that doesn't fit is elided and shown as tooltip.
 
-    elides_text = True
+    The accessible name is the text, unless another one is set.
+    """
 
     def __init__(
         self,
@@ -173,15 +193,29 @@ class Button(PaintedButton):
         size: Size = "normal",
         parent: QWidget | None = None,
     ) -> None:
+        super().__init__(parent)
+        self._theme = theme
         self.metrics = _METRICS[size]
-        super().__init__(theme, text, radius=self.metrics.radius, parent=parent)
         self.kind: Kind = kind
         self.icon_name = icon
         self.has_filled_icon = False
         self.icon_role = ""
         """Colour role of the icon; "" for the colour of the text."""
         self._min_width: int | None = None
-        self.setCursor(Qt.CursorShape.ArrowCursor)
+        self.set_text(text)
+        self.setProperty("kind", kind)
+        self.setProperty("metrics", size)
+        set_up_button(self, theme, self.metrics.radius)
+
+    def set_text(self, text: str, name: str = "") -> None:
+        """Set the text and the accessible name.
+
+        Args:
+            text: Text.
+            name: Accessible name, or "" to use the text.
+        """
+        self.setText(text)
+        self.setAccessibleName(name or text)
 
     def set_label(self, text: str, icon: str | None = None, *, name: str = "") -> None:
         """Set the text and the icon.
@@ -204,21 +238,27 @@ class Button(PaintedButton):
         if self.metrics != _METRICS[size]:
             self.metrics = _METRICS[size]
             self.setProperty("focusRadius", self._theme.radius(self.metrics.radius))
+            paint.set_style_property(self, "metrics", size)
             self.updateGeometry()
-            self.update()
 
     def set_kind(self, kind: Kind) -> None:
         """Set the kind, which determines the colours, such as "primary" or "ghost"."""
-        if kind != self.kind:
-            self.kind = kind
-            self.update()
+        self.kind = kind
+        paint.set_style_property(self, "kind", kind)
 
     def width_with(self, text: str) -> int:
         """Return the width in px that the button needs for a text."""
         width = paint.width_of(self._theme.font(self.metrics.font), text) + 2 * self.metrics.padding
-        if self.icon_name is not None:
-            width += self.icon_side() + (self.metrics.gap if text else 0)
-        return round(width) + 1
+        return round(width) + 1 + self._icon_width(text) + self._indicator_width()
+
+    def _icon_width(self, text: str) -> int:
+        # Width in px of the icon and the gap between it and a text.
+        if self.icon_name is None:
+            return 0
+        return self.icon_side() + (self.metrics.gap if text else 0)
+
+    def _indicator_width(self) -> int:
+        return 0
 
     def sizeHint(self) -> QSize:
         text_height = round(paint.height_of(self._theme.font(self.metrics.font))) + 8
@@ -242,90 +282,85 @@ class Button(PaintedButton):
         return round(self._theme.scaled(self.metrics.icon))
 
     def displayed_text(self) -> str:
-        """Return the text to paint, which differs from `text` if only the icon is shown."""
+        """Return the text to show, which differs from `text` if only the icon is shown."""
         return self.text()
 
-    def paint_button(self, painter: QPainter, rect: QRectF) -> None:
-        fill, border, colour = self._colours()
-        paint.box(painter, rect, self._theme.radius(self.metrics.radius), fill, border)
-        self.paint_content(painter, colour)
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if not click_on_enter(self, event):
+            super().keyPressEvent(event)
 
-    def paint_content(self, painter: QPainter, colour: QColor) -> None:
-        """Paint icon and text, centred together.
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        paint.set_elision_tooltip(self, self.text())
 
-        Args:
-            painter: Painter.
-            colour: Colour of the text and, by default, of the icon.
-        """
-        font = self._theme.font(self.metrics.font)
-        if self.metrics.font == "body":
-            font.setWeight(font.Weight.Medium)
-        frame = QRectF(self.rect())
+    def initStyleOption(self, option: QStyleOptionButton) -> None:
+        super().initStyleOption(option)
         text = self.displayed_text()
-        text_width = paint.width_of(font, text)
-        icon = self.icon_side() if self.icon_name is not None else 0
-        gap = self.metrics.gap if icon and text else 0
-        left = max(frame.left() + 6, frame.center().x() - (icon + gap + text_width) / 2)
+        icon_width, padding = self._icon_width(text), min(_MIN_PADDING, self.metrics.padding)
+        space = self.width() - 2 * padding - icon_width - self._indicator_width()
+        elided = QFontMetricsF(self.font()).elidedText(text, Qt.TextElideMode.ElideRight, space + 1)
+        option.text = elided.replace("&", "&&")
         if self.icon_name is not None:
-            top = frame.center().y() - icon / 2
+            role = self.icon_role or BUTTON_COLOURS[self.kind].text
+            if self.kind == "toggle" and self.isChecked():
+                role = "selectedText"
             is_filled = self.has_filled_icon and self.isEnabled()
-            icon_colour = (
-                self._theme.colour(self.icon_role) if self.icon_role and self.isEnabled() else colour
-            )
-            icon_rect = QRectF(left, top, icon, icon)
-            paint_icon(painter, icon_rect, self.icon_name, icon_colour, is_filled=is_filled)
-        end = frame.bottomRight() - QPointF(4, 0)
-        area = QRectF(QPointF(left + icon + gap, frame.top()), end)
-        paint.text_line(painter, area, text, font, colour)
-
-    def _colours(self) -> tuple[QColor | None, QColor | None, QColor]:
-        # Colours of fill, border and text.
-        theme = self._theme
-        normal, hover, pressed, border, text_role = _COLOURS[self.kind]
-        if not self.isEnabled():
-            edge = "border" if self.kind != "ghost" else None
-            return None, theme.colour(edge) if edge else None, theme.colour("textDisabled")
-        role = pressed if self.isDown() or self.isChecked() else hover if self.underMouse() else normal
-        return (
-            theme.colour(role) if role else None,
-            theme.colour(border) if border else None,
-            theme.colour(text_role),
-        )
+            option.icon = self._theme.icon(self.icon_name, role, active_role=role, is_filled=is_filled)
+            option.iconSize = QSize(icon_width - (QT_ICON_GAP if text else 0), self.icon_side())
 
 
 class MenuButton(Button):
     """Button with a chevron that opens a menu."""
 
-    def sizeHint(self) -> QSize:
-        return super().sizeHint() + QSize(round(self._theme.scaled(CHEVRON)) + CHEVRON_GAP, 0)
+    def _indicator_width(self) -> int:
+        return round(self._theme.scaled(CHEVRON)) + CHEVRON_GAP
 
-    def paint_content(self, painter: QPainter, colour: QColor) -> None:
-        side = self._theme.scaled(CHEVRON)
-        bounds = QRectF(self.rect())
-        icon_rect = QRectF(bounds.right() - side - CHEVRON_GAP, bounds.center().y() - side / 2, side, side)
-        paint_icon(painter, icon_rect, "chevron-down", colour)
-        painter.save()
-        painter.setClipRect(bounds.adjusted(0, 0, -side - CHEVRON_GAP, 0))
-        painter.translate(-(side + CHEVRON_GAP) / 2, 0)
-        super().paint_content(painter, colour)
-        painter.restore()
+    def paintEvent(self, event: QPaintEvent) -> None:
+        super().paintEvent(event)
+        painter, side = QPainter(self), self._theme.scaled(CHEVRON)
+        icon_rect = QRectF(0, (self.height() - side) / 2, side, side)
+        icon_rect.moveRight(self.width() - CHEVRON_GAP)
+        role = BUTTON_COLOURS[self.kind].text if self.isEnabled() else "textDisabled"
+        paint_icon(painter, icon_rect, "chevron-down", self._theme.colour(role))
+        painter.end()
 
 
 class ToggleButton(Button):
-    """Checkable button, painted in the colours of a selection while it is checked."""
+    """Checkable button, in the colours of a selection while it is checked."""
 
     def __init__(self, theme: Theme, text: str, icon: str) -> None:
-        super().__init__(theme, text, icon, size="small")
+        super().__init__(theme, text, icon, kind="toggle", size="small")
         self.setCheckable(True)
 
-    def _colours(self) -> tuple[QColor | None, QColor | None, QColor]:
-        colour = self._theme.colour
-        if self.isChecked() and self.isEnabled():
-            return colour("selected"), colour("accent"), colour("selectedText")
-        return super()._colours()
+
+class LinkButton(Button):
+    """Button that looks like a link, with an optional icon after the text."""
+
+    def __init__(self, theme: Theme, text: str, icon: str | None = None) -> None:
+        super().__init__(theme, text, icon, kind="link", size="link")
+        self._min_width = 80
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+
+    def set_label(self, text: str, icon: str | None = None, *, name: str = "") -> None:
+        """Set the text and the icon after it.
+
+        Args:
+            text: Text.
+            icon: Name of the icon; None removes the icon.
+            name: Accessible name, or "" to use the text.
+        """
+        self.icon_name = icon
+        super().set_label(text, icon, name=name)
+
+    def initStyleOption(self, option: QStyleOptionButton) -> None:
+        super().initStyleOption(option)
+        is_mirrored = self.layoutDirection() == Qt.LayoutDirection.RightToLeft
+        option.direction = (  # the icon is after the text
+            Qt.LayoutDirection.LeftToRight if is_mirrored else Qt.LayoutDirection.RightToLeft
+        )
 
 
-class IconButton(PaintedButton):
+class IconButton(QToolButton):
     """Button with only an icon. The name is shown as tooltip, with the shortcut."""
 
     def __init__(
@@ -339,9 +374,10 @@ class IconButton(PaintedButton):
         size: int = 28,
         parent: QWidget | None = None,
     ) -> None:
-        super().__init__(theme, checkable=checkable, parent=parent)
-        self._icon = icon
-        self._side = size
+        super().__init__(parent)
+        self._theme, self._icon, self._side = theme, icon, size
+        self.setCheckable(checkable)
+        set_up_button(self, theme, "small")
         self.set_name(name, shortcut)
 
     def set_name(self, name: str, shortcut: str = "") -> None:
@@ -349,76 +385,41 @@ class IconButton(PaintedButton):
         self.setAccessibleName(name)
         self.setToolTip(plain.tip(tip_with_key(name, shortcut)))
 
-    def _icon_side(self) -> float:
+    def _icon_side(self) -> int:
         name = "normal" if self._side < 40 else "large"
-        return self._theme.scaled(self._theme.size("icon", name))
+        return round(self._theme.scaled(self._theme.size("icon", name)))
 
     def set_icon(self, icon: str) -> None:
         """Set the icon by name."""
         self._icon = icon
         self.update()
 
+    @property
+    def is_drop_target(self) -> bool:
+        """True if the button is the drop target of a drag."""
+        return self.property("dropTarget") is True
+
+    def set_drop_target(self, is_drop_target: bool) -> None:
+        """Set whether the button is the drop target of a drag; a drop target has a ring."""
+        paint.set_style_property(self, "dropTarget", is_drop_target)
+
     def sizeHint(self) -> QSize:
-        side = max(self._side, round(self._icon_side()) + 10)
+        side = max(self._side, self._icon_side() + 10)
         return QSize(side, side)
 
     def minimumSizeHint(self) -> QSize:
         return self.sizeHint()
 
-    def paint_button(self, painter: QPainter, rect: QRectF) -> None:
-        theme = self._theme
-        fill, icon_role = None, "textSecondary"
-        if self.isChecked():
-            fill, icon_role = "accentTint", "accentText"
-        elif self.isDown():
-            fill, icon_role = "pressed", "text"
-        elif self.is_hovered:
-            fill, icon_role = "hover", "text"
-        if fill is not None:
-            paint.box(painter, rect, theme.radius("small"), theme.colour(fill))
-        side = self._icon_side()
-        icon_rect = QRectF(0, 0, side, side)
-        icon_rect.moveCenter(rect.center())
-        paint_icon(
-            painter, icon_rect, self._icon, theme.colour(icon_role if self.isEnabled() else "textDisabled")
-        )
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if not click_on_enter(self, event):
+            super().keyPressEvent(event)
 
-
-class LinkButton(PaintedButton):
-    """Button that looks like a link, with an optional icon after the text."""
-
-    elides_text = True
-
-    def __init__(self, theme: Theme, text: str, icon: str | None = None) -> None:
-        super().__init__(theme, text)
-        self._icon = icon
-        self.setCursor(Qt.CursorShape.PointingHandCursor)
-
-    def set_label(self, text: str, icon: str | None) -> None:
-        """Set the text and the icon after it; None removes the icon."""
-        self._icon = icon
-        self.set_text(text)
-        self.updateGeometry()
-        self.update()
-
-    def sizeHint(self) -> QSize:
-        font = self._theme.font("title")
-        width = round(paint.width_of(font, self.text())) + 2 + (ARROW_SIZE + 6 if self._icon else 0)
-        return QSize(width, max(24, round(paint.height_of(font)) + 4))
-
-    def minimumSizeHint(self) -> QSize:
-        return QSize(80, self.sizeHint().height())
-
-    def paint_button(self, painter: QPainter, rect: QRectF) -> None:
-        font, colour = self._theme.font("title"), self._theme.colour("accentText")
-        font.setUnderline(self.is_hovered)
-        if self._icon is not None:
-            icon_rect = QRectF(
-                rect.right() - ARROW_SIZE, rect.center().y() - ARROW_SIZE / 2, ARROW_SIZE, ARROW_SIZE
-            )
-            paint_icon(painter, icon_rect, self._icon, colour)
-            rect.adjust(0, 0, -ARROW_SIZE - 6, 0)
-        paint.text_line(painter, rect, self.text(), font, colour)
+    def initStyleOption(self, option: QStyleOptionToolButton) -> None:
+        super().initStyleOption(option)
+        is_active = self.isDown() or self.underMouse()
+        role = "accentText" if self.isChecked() else "text" if is_active else "textSecondary"
+        option.icon = self._theme.icon(self._icon, role, active_role=role)
+        option.iconSize = QSize(self._icon_side(), self._icon_side())
 
 
 class RunButton(Button):

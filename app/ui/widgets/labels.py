@@ -30,10 +30,7 @@ def label(text: str = "", kind: str = "body", *, role: str = "text", wrap: bool 
 
 def set_role(widget: QLabel, role: str) -> None:
     """Set the colour role of a label."""
-    if widget.property("role") != role:
-        widget.setProperty("role", role)
-        widget.style().unpolish(widget)
-        widget.style().polish(widget)
+    paint.set_style_property(widget, "role", role)
 
 
 class ElidedLabel(QLabel):

@@ -1,6 +1,6 @@
 """Painting of shapes and texts: boxes, lines, single-line text, key caps.
 
-The module also contains helpers for tooltips, screen readers and the visibility of widgets.
+The module also contains helpers for tooltips, screen readers, visibility and the style of widgets.
 """
 
 from __future__ import annotations
@@ -168,3 +168,12 @@ def show_when(widget: QWidget, visible: bool) -> None:
         widget.show()
     else:
         widget.setAttribute(Qt.WidgetAttribute.WA_WState_ExplicitShowHide, False)
+
+
+def set_style_property(widget: QWidget, name: str, value: object) -> None:
+    """Set a dynamic property that the style sheet uses, and apply the style sheet again if it changed."""
+    if widget.property(name) != value:
+        widget.setProperty(name, value)
+        widget.style().unpolish(widget)
+        widget.style().polish(widget)
+        widget.update()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QEvent, QObject, QSize
-from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QWidget
 
 from app.core.recording.recordings import SessionRecordings
@@ -42,7 +41,7 @@ class RecordButton(Button):
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme, _("Record"), "circle-dot", size="small")
         self.icon_role = "error"
-        self._is_on = self._is_icon_only = False
+        self._is_icon_only = False
 
     def set_icon_only(self, is_icon_only: bool) -> None:
         """Show only the icon if `is_icon_only`, else the icon and the text."""
@@ -56,8 +55,8 @@ class RecordButton(Button):
 
     def show_recording(self, recordings: SessionRecordings) -> None:
         """Show the duration and size of the current recording, or "Record" if there is none."""
-        self._is_on = recordings.is_recording
-        if not self._is_on:
+        self.set_kind("recording" if recordings.is_recording else "plain")
+        if not recordings.is_recording:
             self.set_label(_("Record"))
             return
         length = length_text(recordings.elapsed_s)
@@ -73,12 +72,6 @@ class RecordButton(Button):
         return QSize(
             icon_width if self._is_icon_only else round(self._theme.scaled(RECORD_BUTTON_WIDTH_PX)), height
         )
-
-    def _colours(self) -> tuple[QColor | None, QColor | None, QColor]:
-        colour = self._theme.colour
-        if self._is_on and self.isEnabled():
-            return colour("pressed"), colour("borderStrong"), colour("error")
-        return super()._colours()
 
 
 LIVE_ICON, RECORDING_ICON = "radio-tower", "history"
@@ -110,6 +103,7 @@ class SourceSwitch(MenuButton):
         """Update the text and icon to the current source."""
         replay = self._session.replay
         self._is_recording = replay is not None
+        self.set_kind("replay" if self._is_recording else "plain")
         if replay is None:
             self.set_label(_("Live network"), LIVE_ICON)
             return
@@ -121,12 +115,6 @@ class SourceSwitch(MenuButton):
         menu = Menu(self._theme, self)
         menu.addActions([self._actions["replay.open"], self._actions["replay.live"]])
         open_below(menu, self)
-
-    def _colours(self) -> tuple[QColor | None, QColor | None, QColor]:
-        if self._is_recording and self.isEnabled():
-            colour = self._theme.colour
-            return colour("accentTint"), colour("accent"), colour("accentText")
-        return super()._colours()
 
 
 class DeveloperTools(QObject):

@@ -172,9 +172,7 @@ class NumberEdit(QLineEdit):
         if message == self.problem:
             return
         self.problem = message
-        self.setProperty("wrong", "true" if message else "false")
-        self.style().unpolish(self)
-        self.style().polish(self)
+        paint.set_style_property(self, "wrong", "true" if message else "false")
         self.problem_changed.emit(message)
 
     def paintEvent(self, event: QPaintEvent) -> None:
