@@ -117,7 +117,7 @@ def _status_widgets(theme: Theme) -> list[QWidget]:
     banner.show_text(
         "error", "The camera of Pepper has been silent for 4 s.", "The behaviour is waiting.", "Show", 2
     )
-    card = Card(theme)
+    card = Card()
     layout = QVBoxLayout(card)
     layout.addWidget(label("Create a behaviour", "heading"))
     layout.addWidget(label("Start with an empty page.", "bodyLarge", role="textSecondary"))

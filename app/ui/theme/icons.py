@@ -95,23 +95,29 @@ def paint_icon(
 
 @lru_cache(maxsize=256)
 def _cached_pixmap(
-    name: str, width: float, height: float, rgba: int, ratio: float, is_filled: bool = False
+    name: str,
+    width: float,
+    height: float,
+    rgba: int,
+    ratio: float,
+    is_filled: bool = False,
+    is_trailing: bool = False,
 ) -> QPixmap:
     pixmap = QPixmap(round(width * ratio), round(height * ratio))
     pixmap.setDevicePixelRatio(ratio)
     pixmap.fill(Qt.GlobalColor.transparent)
     painter = QPainter(pixmap)
-    icon_rect = _leading_square(QRectF(0, 0, width, height))
+    icon_rect = _square_in(QRectF(0, 0, width, height), is_trailing)
     paint_icon(painter, icon_rect, name, QColor.fromRgba(rgba), is_filled=is_filled)
     painter.end()
     return pixmap
 
 
-def _leading_square(rect: QRectF) -> QRectF:
+def _square_in(rect: QRectF, is_trailing: bool) -> QRectF:
     # A wider rectangle has space for the gap between the icon and a text.
     side = min(rect.width(), rect.height())
     square = QRectF(rect.left(), rect.center().y() - side / 2, side, side)
-    if QGuiApplication.isRightToLeft():
+    if is_trailing != QGuiApplication.isRightToLeft():
         square.moveRight(rect.right())
     return square
 
@@ -130,32 +136,37 @@ def paint_cached_icon(painter: QPainter, rect: QRectF, name: str, colour: QColor
 class IconEngine(QIconEngine):
     """Icon engine that paints an icon in the colour of the current mode, such as normal or disabled.
 
-    In a size that is wider than high, the icon is at the leading edge.
+    In a size that is wider than high, the icon is at the leading or trailing edge.
     """
 
     def __init__(
-        self, name: str, colour: Callable[[QIcon.Mode, QIcon.State], QColor], *, is_filled: bool = False
+        self,
+        name: str,
+        colour: Callable[[QIcon.Mode, QIcon.State], QColor],
+        *,
+        is_filled: bool = False,
+        is_trailing: bool = False,
     ) -> None:
         # `colour` is called at each paint, so that a new theme needs no new icon.
         super().__init__()
         _source(name)
         self._name = name
         self._colour = colour
-        self._is_filled = is_filled
+        self._is_filled, self._is_trailing = is_filled, is_trailing
 
     def paint(self, painter: QPainter, rect: QRect, mode: QIcon.Mode, state: QIcon.State) -> None:
-        icon_rect, colour = _leading_square(QRectF(rect)), self._colour(mode, state)
+        icon_rect, colour = _square_in(QRectF(rect), self._is_trailing), self._colour(mode, state)
         paint_icon(painter, icon_rect, self._name, colour, is_filled=self._is_filled)
 
     def pixmap(self, size: QSize, mode: QIcon.Mode, state: QIcon.State) -> QPixmap:
         return self.scaledPixmap(size, mode, state, 1.0)
 
     def scaledPixmap(self, size: QSize, mode: QIcon.Mode, state: QIcon.State, scale: float) -> QPixmap:
-        rgba = self._colour(mode, state).rgba()
-        return _cached_pixmap(self._name, size.width(), size.height(), rgba, scale, self._is_filled)
+        width, height, rgba = size.width(), size.height(), self._colour(mode, state).rgba()
+        return _cached_pixmap(self._name, width, height, rgba, scale, self._is_filled, self._is_trailing)
 
     def key(self) -> str:
         return f"nep:{self._name}"
 
     def clone(self) -> QIconEngine:
-        return IconEngine(self._name, self._colour, is_filled=self._is_filled)
+        return IconEngine(self._name, self._colour, is_filled=self._is_filled, is_trailing=self._is_trailing)

@@ -35,6 +35,7 @@ BUTTON_COLOURS: Mapping[str, ButtonColours] = {
     "toggle": ButtonColours("panel", "hover", "pressed", "borderStrong", "text"),
     "ghost": ButtonColours(None, "hover", "pressed", None, "text"),
     "link": ButtonColours(None, None, None, None, "accentText"),
+    "segment": ButtonColours(None, "pressed", None, None, "textSecondary"),
     "primary": ButtonColours("accent", "accentHover", "accentHover", None, "onAccent"),
     "run": ButtonColours("run", "runHover", "runHover", None, "onRun"),
     "stop": ButtonColours("stop", "stopHover", "stopHover", None, "onStop"),
@@ -50,6 +51,9 @@ _BUTTON_FONTS = {
     "form": ("label", None, "control"),
     "large": ("button", None, "large"),
     "link": ("title", None, "small"),
+    "smallSegment": ("body", 500, "small"),
+    "segment": ("body", 500, "small"),
+    "formSegment": ("label", 500, "small"),
 }
 
 
@@ -59,6 +63,10 @@ class ThemeValues(Protocol):
     @property
     def is_dark(self) -> bool:
         """True if the theme is dark."""
+
+    @property
+    def is_high_contrast(self) -> bool:
+        """True if the contrast is high."""
 
     def hex(self, role: str) -> str:
         """Return the colour of a role as ``#RRGGBB`` or ``#RRGGBBAA``."""
@@ -110,6 +118,7 @@ Button {{ padding: 0 3px; }}
 Button[kind="toggle"]:checked:enabled {{
     background: {selected}; border-color: {accent}; color: {selectedText};
 }}
+Button[kind="segment"]:checked {{ background: {segment}; border: 1px solid {border}; color: {text}; }}
 Button[kind="link"] {{ padding: 0; }}
 Button[kind="link"]:hover {{ text-decoration: underline; }}
 MenuButton {{ padding-right: {menu_button_padding}px; }}
@@ -119,6 +128,26 @@ IconButton:pressed {{ background: {pressed}; }}
 IconButton:checked {{ background: {accentTint}; }}
 IconButton[dropTarget="true"] {{ background: {accentTint}; border: 2px solid {accent}; }}
 
+Card {{ background: {panel}; border: 1px solid {border}; border-radius: {card}px; }}
+Card[sunken="true"] {{ background: {sunken}; }}
+Card[accented="true"] {{ border-color: {accent}; }}
+FloatingCard {{ background: {raised}; border: 1px solid {borderStrong}; border-radius: {large}px; }}
+Overlay {{ background: {raised}; border: 1px solid {borderStrong}; border-radius: {palette}px; }}
+MotionPermissionCard {{ background: {raised}; border: 1px solid {warnBorder}; border-radius: {card}px; }}
+_MatchPopup {{ background: {raised}; border: 1px solid {borderStrong}; border-radius: {panel_radius}px; }}
+_ReadOnlyRow {{ background: {sunken}; border: 1px solid {borderStrong}; border-radius: {control}px; }}
+StatusBar {{ background: {window}; }}
+LargeRoom {{ background: {panel}; }}
+ArmedStrip[armed="true"] {{ background: {warnTint}; }}
+ProblemRow:hover {{ background: {hover}; border-radius: {small}px; margin: 1px 4px; }}
+StepRow[state="next"] {{ background: {accentTint}; border-radius: {panel_radius}px; }}
+Segments {{ background: {sunken}; border: {segments_border}; border-radius: {panel_radius}px; }}
+QLabel[keyCap="true"] {{ background: {sunken}; border-radius: {key}px; padding: 2px 6px; }}
+
+FieldFrame {{ background: {field}; border: 1px solid {controlBorder}; border-radius: {control}px; }}
+FieldFrame[focused="true"] {{ border: 2px solid {accent}; }}
+FieldFrame[wrong="true"] {{ border-color: {error}; }}
+JsonEdit {{ background: {panel}; }}
 QLineEdit, QPlainTextEdit, QTextEdit {{
     background: {field}; color: {text}; border: 1px solid {controlBorder}; border-radius: {control}px;
     padding: 3px 8px; selection-background-color: {selected}; selection-color: {selectedText};
@@ -225,10 +254,14 @@ class _Roles(dict[str, str]):
 def build(theme: ThemeValues) -> str:
     """Return the style sheet for a theme."""
     roles = _Roles(theme)
+    has_border = theme.is_dark or theme.is_high_contrast
     roles.update(
         small=str(theme.radius("small")),
         control=str(theme.radius("control")),
         panel_radius=str(theme.radius("panel")),
+        **{name: str(theme.radius(name)) for name in ("key", "large", "card", "palette")},
+        segment=theme.hex("pressed" if theme.is_dark else "panel"),
+        segments_border=f"1px solid {theme.hex('border')}" if has_border else "none",
         field=theme.hex("sunken") if theme.is_dark else theme.hex("panel"),
         menu_button_padding=str(round(theme.scaled(14)) + 9),
         small_text=str(round(theme.scaled(theme.text_kinds()["small"].size_px))),

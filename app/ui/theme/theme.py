@@ -73,7 +73,7 @@ class Theme(QObject):
         self.contrast: Preference = "off"  # "on" means high contrast
         self.is_motion_reduced = self.is_high_contrast = False
         self._is_dark = self._resolve_dark()
-        self._icons: dict[tuple[str, str, str, bool], QIcon] = {}
+        self._icons: dict[tuple[str, str, str, bool, bool], QIcon] = {}
         self._fonts: dict[str, QFont] = {}
         self._hints.colorSchemeChanged.connect(self._system_changed)
         system.on_contrast_changed(self._hints, lambda: self.set_contrast(self.contrast))
@@ -334,7 +334,13 @@ class Theme(QObject):
         return self._tokens.icons[use]
 
     def icon(
-        self, name: str, role: str = "textSecondary", *, active_role: str = "text", is_filled: bool = False
+        self,
+        name: str,
+        role: str = "textSecondary",
+        *,
+        active_role: str = "text",
+        is_filled: bool = False,
+        is_trailing: bool = False,
     ) -> QIcon:
         """Return an icon that follows changes of the theme.
 
@@ -343,8 +349,9 @@ class Theme(QObject):
             role: Colour role.
             active_role: Colour role while the icon is active, for example hovered.
             is_filled: True to fill the shape with the colour.
+            is_trailing: True for the trailing edge of a size that is wider than high.
         """
-        key = (name, role, active_role, is_filled)
+        key = (name, role, active_role, is_filled, is_trailing)
         if key not in self._icons:
 
             def colour(mode: QIcon.Mode, _state: QIcon.State) -> QColor:
@@ -352,7 +359,7 @@ class Theme(QObject):
                     return self.colour("textDisabled")
                 return self.colour(active_role if mode == QIcon.Mode.Active else role)
 
-            self._icons[key] = QIcon(IconEngine(name, colour, is_filled=is_filled))
+            self._icons[key] = QIcon(IconEngine(name, colour, is_filled=is_filled, is_trailing=is_trailing))
         return self._icons[key]
 
     # -- block editor -----------------------------------------------------------------------------

@@ -28,8 +28,8 @@ from app.ui.widgets import paint
 from app.ui.widgets.keyboard import has_no_modifiers
 from nep.i18n import _
 
-Kind = Literal["plain", "primary", "ghost", "run", "stop", "toggle", "link", "recording", "replay"]
-Size = Literal["small", "normal", "form", "large", "link"]
+Kind = Literal["plain", "primary", "ghost", "run", "stop", "toggle", "link", "segment", "recording", "replay"]
+Size = Literal["small", "normal", "form", "large", "link", "smallSegment", "segment", "formSegment"]
 CHEVRON, CHEVRON_GAP = 14, 6
 QT_ICON_GAP = 2  # px that Qt adds between the icon and the text of a QPushButton
 BarName = Literal["runBar", "toolBar", "appBar"]
@@ -54,6 +54,9 @@ _METRICS: dict[str, _ButtonMetrics] = {
     "form": _ButtonMetrics(36, "label", 16, 8, 14, "control"),
     "large": _ButtonMetrics(44, "button", 20, 10, 18, "large"),
     "link": _ButtonMetrics(24, "title", 16, 6, 1, "small"),
+    "smallSegment": _ButtonMetrics(24, "body", 16, 8, 10, "small"),
+    "segment": _ButtonMetrics(28, "body", 16, 8, 14, "small"),
+    "formSegment": _ButtonMetrics(32, "label", 16, 8, 14, "small"),
 }
 _MIN_PADDING = 5  # px beside the contents of a button that is narrower than its size hint
 
@@ -253,7 +256,7 @@ class Button(QPushButton):
 
     def _icon_width(self, text: str) -> int:
         # Width in px of the icon and the gap between it and a text.
-        if self.icon_name is None:
+        if self.displayed_icon() is None:
             return 0
         return self.icon_side() + (self.metrics.gap if text else 0)
 
@@ -285,6 +288,14 @@ class Button(QPushButton):
         """Return the text to show, which differs from `text` if only the icon is shown."""
         return self.text()
 
+    def displayed_icon(self) -> str | None:
+        """Return the name of the icon to show, which differs from `icon_name` if it depends on the state."""
+        return self.icon_name
+
+    def icon_colour_role(self) -> str:
+        """Return the colour role of the icon while the button is enabled."""
+        return self.icon_role or BUTTON_COLOURS[self.kind].text
+
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if not click_on_enter(self, event):
             super().keyPressEvent(event)
@@ -300,12 +311,12 @@ class Button(QPushButton):
         space = self.width() - 2 * padding - icon_width - self._indicator_width()
         elided = QFontMetricsF(self.font()).elidedText(text, Qt.TextElideMode.ElideRight, space + 1)
         option.text = elided.replace("&", "&&")
-        if self.icon_name is not None:
-            role = self.icon_role or BUTTON_COLOURS[self.kind].text
-            if self.kind == "toggle" and self.isChecked():
-                role = "selectedText"
-            is_filled = self.has_filled_icon and self.isEnabled()
-            option.icon = self._theme.icon(self.icon_name, role, active_role=role, is_filled=is_filled)
+        icon = self.displayed_icon()
+        if icon is not None:
+            role, is_filled = self.icon_colour_role(), self.has_filled_icon and self.isEnabled()
+            option.icon = self._theme.icon(
+                icon, role, active_role=role, is_filled=is_filled, is_trailing=self.kind == "link"
+            )
             option.iconSize = QSize(icon_width - (QT_ICON_GAP if text else 0), self.icon_side())
 
 
@@ -331,6 +342,9 @@ class ToggleButton(Button):
     def __init__(self, theme: Theme, text: str, icon: str) -> None:
         super().__init__(theme, text, icon, kind="toggle", size="small")
         self.setCheckable(True)
+
+    def icon_colour_role(self) -> str:
+        return "selectedText" if self.isChecked() else super().icon_colour_role()
 
 
 class LinkButton(Button):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import QEvent, QRectF, QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QFrame, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QVBoxLayout, QWidget
 
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
@@ -18,19 +18,22 @@ TILE_SIZE = 28
 BORDER_ROLES = {"error": "errorBorder", "warn": "warnBorder", "ok": "okBorder", "info": "borderStrong"}
 
 
-class Card(QFrame):
+class Card(QWidget):
     """Frame with a border and large rounded corners."""
 
-    def __init__(self, theme: Theme, *, radius: str = "card", fill: str = "panel") -> None:
+    def __init__(self, *, is_sunken: bool = False) -> None:
         super().__init__()
-        self._theme, self._radius, self.fill = theme, radius, fill
-        self.border = "border"
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        self.setProperty("sunken", is_sunken)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter, theme = QPainter(self), self._theme
-        fill, edge = theme.colour(self.fill), theme.colour(self.border)
-        paint.box(painter, QRectF(self.rect()), theme.radius(self._radius), fill, edge)
-        painter.end()
+    @property
+    def is_accented(self) -> bool:
+        """True if the card has a border in the accent colour."""
+        return self.property("accented") is True
+
+    def set_accented(self, is_accented: bool) -> None:
+        """Set whether the card has a border in the accent colour."""
+        paint.set_style_property(self, "accented", is_accented)
 
 
 class Tile(QWidget):

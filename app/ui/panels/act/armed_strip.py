@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from PySide6.QtCore import QRectF, Qt
-from PySide6.QtGui import QAction, QActionGroup, QPainter, QPaintEvent
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction, QActionGroup
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.core.run.acting.acting import SessionActing
@@ -36,9 +36,9 @@ class ArmedStrip(QWidget):
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__()
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self._context, self._theme = context, context.theme
         self._last_state: tuple[object, ...] = ()
-        self._is_on = False
         self.switch = Switch(self._theme, _("Armed"))
         self.switch.clicked.connect(self._toggle_armed)
         self.text_label = label("", "small", role="textSecondary")
@@ -92,7 +92,7 @@ class ArmedStrip(QWidget):
         if state == self._last_state:
             return
         self._last_state = state
-        self._is_on = arming.is_on
+        paint.set_style_property(self, "armed", arming.is_on)
         self.switch.setChecked(arming.is_on)
         can_arm = self.is_for_replay or is_live
         self.switch.setEnabled(can_arm or arming.is_on)
@@ -154,12 +154,6 @@ class ArmedStrip(QWidget):
                 self._context.show_toast(error)
         self._last_state = ()
         self.refresh()
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        if self._is_on:
-            painter = QPainter(self)
-            painter.fillRect(QRectF(self.rect()), self._theme.colour("warnTint"))
-            painter.end()
 
 
 class ArmDurationMenu(Menu):

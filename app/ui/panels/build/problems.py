@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QMouseEvent, QResizeEvent
 from PySide6.QtWidgets import (
     QGridLayout,
     QSizePolicy,
@@ -76,7 +76,7 @@ class ProblemRow(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         if problem.block_id:
             self.setCursor(Qt.CursorShape.PointingHandCursor)
-        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
+            self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self._grid = grid = QGridLayout(self)
         grid.setContentsMargins(LEFT_MARGIN, 0, RIGHT_MARGIN, 0)
         grid.setHorizontalSpacing(SPACING)
@@ -152,13 +152,6 @@ class ProblemRow(QWidget):
     def _press(self) -> None:
         if self.problem.block_id:
             self.pressed.emit(self.problem.block_id)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        if self.problem.block_id and self.underMouse():
-            painter = QPainter(self)
-            rect = QRectF(self.rect()).adjusted(4, 1, -4, -1)
-            paint.box(painter, rect, self._theme.radius("small"), self._theme.colour("hover"))
-            painter.end()
 
 
 class ProblemsPanel(PanelWidget):

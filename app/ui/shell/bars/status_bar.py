@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
 from app.core.network.remote_access import access_status
@@ -296,6 +295,7 @@ class StatusBar(QWidget):
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self._theme = theme
         self.setObjectName("statusBar")  # sheets end above the widget with this name
         self.setMinimumHeight(theme.size("statusBar"))
@@ -351,9 +351,3 @@ class StatusBar(QWidget):
     def texts(self) -> list[str]:
         """Return the texts of the visible items, from left to right."""
         return [item.text for item in self.items()]
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.fillRect(self.rect(), self._theme.colour("window"))
-        painter.end()

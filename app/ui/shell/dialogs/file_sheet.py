@@ -39,7 +39,7 @@ from app.ui.text import plain
 from app.ui.text.dates import date_time_text
 from app.ui.text.numbers import size_text
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Button, ElidedLabel, IconButton, label, paint
+from app.ui.widgets import Button, ElidedLabel, IconButton, label, paint, set_role
 from app.ui.widgets.file_dialogs import (
     BEHAVIOUR_FILTER,
     PICTURE_SUFFIXES,
@@ -548,9 +548,7 @@ class FileSheet(Overlay):
         if self.hint.text() == text:
             return
         self.hint.setText(text)
-        self.hint.setProperty("role", role)
-        self.hint.style().unpolish(self.hint)
-        self.hint.style().polish(self.hint)
+        set_role(self.hint, role)
         paint.show_when(self.hint, bool(text))
         if text:
             paint.announce(self.hint, text)

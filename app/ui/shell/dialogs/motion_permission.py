@@ -55,6 +55,7 @@ class MotionPermissionCard(QWidget):
     ) -> None:
         # `report_error` is called with a message if "always" can't be saved.
         super().__init__(window)
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self._theme, self._permission = theme, permission
         self._last_revision = permission.revision
         self._previous_focus: QWidget | None = None
@@ -178,9 +179,3 @@ class MotionPermissionCard(QWidget):
             self._answer(is_allowed=False)
         else:
             super().keyPressEvent(event)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        theme, painter = self._theme, QPainter(self)
-        edge = theme.colour("warnBorder")
-        paint.box(painter, QRectF(self.rect()), theme.radius("card"), theme.colour("raised"), edge)
-        painter.end()

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, label, paint
+from app.ui.widgets.inputs.frame import set_invalid
 from app.ui.widgets.menus import FieldContextMenu
 from nep.i18n import _
 
@@ -91,9 +92,7 @@ class NameSheet(Overlay):
     def _show_error(self, message: str) -> None:
         self.error_label.setText(message)
         paint.show_when(self.error_label, bool(message))
-        self.field.setProperty("wrong", "true" if message else "false")
-        self.field.style().unpolish(self.field)
-        self.field.style().polish(self.field)
+        set_invalid(self.field, is_invalid=bool(message))
         self.place()
         if message:
             paint.announce(self.error_label, message)

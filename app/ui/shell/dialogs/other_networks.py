@@ -14,6 +14,7 @@ from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.text.numbers import group_digits
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Separator, Switch, label, paint, set_role
+from app.ui.widgets.inputs.frame import set_invalid
 from app.ui.widgets.menus import FieldContextMenu
 from nep.errors import NepError
 from nep.i18n import _, lazy, ngettext
@@ -202,9 +203,7 @@ class AddressField(QLineEdit):
 
     def set_invalid(self, *, is_invalid: bool) -> None:
         """Show the address as invalid if `is_invalid`, else as valid."""
-        self.setProperty("wrong", "true" if is_invalid else "false")
-        self.style().unpolish(self)
-        self.style().polish(self)
+        set_invalid(self, is_invalid=is_invalid)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:

@@ -150,6 +150,7 @@ class Overlay(QWidget):
     def __init__(self, theme: Theme, window: QWidget, name: str) -> None:
         # `name` is read by screen readers. `open` shows the sheet.
         super().__init__(window)
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.theme = theme
         self.setAccessibleName(name)
         self._scrim = Scrim(theme, window)
@@ -289,13 +290,6 @@ class Overlay(QWidget):
             reason = Qt.FocusReason.TabFocusReason if forward else Qt.FocusReason.BacktabFocusReason
             stop.setFocus(reason)
         return True
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        theme = self.theme
-        fill, edge = theme.colour("raised"), theme.colour("borderStrong")
-        paint.box(painter, QRectF(self.rect()), theme.radius("palette"), fill, edge)
-        painter.end()
 
     def _has_focus(self) -> bool:
         focus = QApplication.focusWidget()

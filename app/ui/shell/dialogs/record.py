@@ -126,7 +126,7 @@ class RecordSheet(Overlay):
         self.write_errors = RecordMeter(_("Write errors"))
         self.disk = RecordMeter(_("Free space"))
         self.expected_size = RecordMeter(_("Expected"))
-        self._meters = Card(self.theme)
+        self._meters = Card()
         row = QHBoxLayout(self._meters)
         row.setContentsMargins(1, 1, 1, 1)
         row.setSpacing(0)
@@ -241,7 +241,7 @@ class RecordSheet(Overlay):
         return _flow(title, labels[0], self.limit_minutes, labels[1], self.limit_gb, self.limits_hint)
 
     def _flight_recorder_card(self) -> Card:
-        box = Card(self.theme, fill="sunken")
+        box = Card(is_sunken=True)
         rows = QVBoxLayout(box)
         rows.setContentsMargins(12, 10, 12, 10)
         rows.setSpacing(8)
@@ -402,7 +402,7 @@ class RecordSheet(Overlay):
         self._show_limits_problem("")
         self.ring.setChecked(settings.is_on)
         self.ring_topics.show_patterns(settings.patterns, settings.excluded)
-        self.ring_topics.set_invalid(bool(settings.problem))
+        self.ring_topics.set_invalid(is_invalid=bool(settings.problem))
         self.seconds.show_number(settings.seconds)
         self.size_gb.show_number(settings.size_gb)
         self._last_topics_state = None
@@ -410,7 +410,7 @@ class RecordSheet(Overlay):
     def _show_pattern_problem(self, problem: str) -> None:
         self.pattern_error.setText(problem)
         self.pattern_error.setVisible(bool(problem))
-        self.patterns.set_invalid(bool(problem))
+        self.patterns.set_invalid(is_invalid=bool(problem))
 
     def show_state(self) -> None:
         """Update the sheet to the state of the recording and of the flight recorder."""
@@ -575,7 +575,7 @@ class RecordSheet(Overlay):
     def _apply_flight_recorder_topics(self) -> None:
         included, excluded = self.ring_topics.patterns()
         problem = replace(self._recordings.ring_settings, patterns=included, excluded=excluded).problem
-        self.ring_topics.set_invalid(bool(problem))
+        self.ring_topics.set_invalid(is_invalid=bool(problem))
         if problem:
             self._show_flight_recorder_problem(problem)
         else:

@@ -46,7 +46,7 @@ class StartCard(Card):
     """Card with an illustration, a heading with an optional chip, text, and buttons."""
 
     def __init__(self, theme: Theme, art: Art, title: str, text: str, buttons: list[Button]) -> None:
-        super().__init__(theme)
+        super().__init__()
         self.art = art
         self.chip = Chip(theme, "", "ok")
         self.text: QLabel = label(text, "bodyLarge", role="textSecondary", wrap=True)
@@ -150,28 +150,6 @@ class RecentRow(PaintedButton):
         paint.text_line(painter, area, self._when, small, theme.colour("textTertiary"), paint.RIGHT)
 
 
-class _CommandLabel(QWidget):
-    """Label for a shell command, painted like a key cap."""
-
-    def __init__(self, theme: Theme, text: str) -> None:
-        super().__init__()
-        self._theme, self._text = theme, text
-        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.setAccessibleName(text)
-
-    def sizeHint(self) -> QSize:
-        font = self._theme.font("code")
-        return QSize(round(paint.width_of(font, self._text)) + 12, round(paint.height_of(font)) + 4)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        theme = self._theme
-        paint.box(painter, QRectF(self.rect()), theme.radius("key"), theme.colour("sunken"))
-        colour = theme.colour("textSecondary")
-        paint.text_line(painter, QRectF(self.rect()), self._text, theme.font("code"), colour, paint.CENTRE)
-        painter.end()
-
-
 class DevelopersLine(QWidget):
     """Line at the bottom of the page with a command and a link for programmers."""
 
@@ -196,7 +174,9 @@ class DevelopersLine(QWidget):
         row.addWidget(question)
         row.addWidget(link)
         row.addWidget(label(_("or type"), "body", role="textSecondary"))
-        row.addWidget(_CommandLabel(theme, "nep topic list"))
+        command = label("nep topic list", "code", role="textSecondary")
+        command.setProperty("keyCap", "true")
+        row.addWidget(command)
         row.addStretch(1)
 
     def paintEvent(self, _event: QPaintEvent) -> None:

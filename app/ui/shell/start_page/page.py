@@ -288,7 +288,7 @@ class StartPage(QWidget):
         self._use_button.set_kind("plain" if is_offered else "primary")
         title, text = OFFER_TEXTS if is_offered else LEARN_TEXTS
         self.learn_card.set_texts(_(title), _(text))
-        self.learn_card.border = "accent" if is_offered else "border"
+        self.learn_card.set_accented(is_offered)
         paint.show_when(self._decline_button, is_offered)
         cards = self._ordered_cards()
         for index, card in enumerate(cards):

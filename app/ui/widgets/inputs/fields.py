@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QFocusEvent, QKeyEvent, QPainter, QPaintEvent, QResizeEvent
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLineEdit, QPlainTextEdit, QSizePolicy, QWidget
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLineEdit, QPlainTextEdit, QSizePolicy
 
 from app.robots.description.typed_number import parse_number
 from app.ui.text import plain
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
+from app.ui.widgets.inputs.frame import FieldFrame, set_invalid
 from app.ui.widgets.keyboard import has_no_modifiers
 from app.ui.widgets.menus import FieldContextMenu
 from nep.i18n import _
@@ -172,7 +173,7 @@ class NumberEdit(QLineEdit):
         if message == self.problem:
             return
         self.problem = message
-        paint.set_style_property(self, "wrong", "true" if message else "false")
+        set_invalid(self, is_invalid=bool(message))
         self.problem_changed.emit(message)
 
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -224,7 +225,7 @@ class _MultiLineEdit(QPlainTextEdit):
             super().keyPressEvent(event)
 
 
-class LongTextField(QWidget):
+class LongTextField(FieldFrame):
     """Multi-line text field; `finished` is emitted when the field loses the focus."""
 
     changed = Signal()
@@ -233,7 +234,6 @@ class LongTextField(QWidget):
     def __init__(self, theme: Theme, name: str) -> None:
         super().__init__()
         self._theme = theme
-        self._is_invalid = False
         self.setAccessibleName(name)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setProperty("focusRadius", theme.radius("control"))
@@ -247,8 +247,8 @@ class LongTextField(QWidget):
         self.edit.textChanged.connect(self._grow)
         self.edit.textChanged.connect(self.changed)
         self.edit.exited.connect(self.finished)
-        self.edit.exited.connect(self.update)
-        self.edit.entered.connect(self.update)
+        self.edit.exited.connect(self.update_focus)
+        self.edit.entered.connect(self.update_focus)
         theme.changed.connect(self._grow)
         self._grow()
 
@@ -260,17 +260,6 @@ class LongTextField(QWidget):
         """Set the text."""
         if text != self.text():
             self.edit.setPlainText(text)
-
-    @property
-    def is_invalid(self) -> bool:
-        """True while the text is shown as invalid."""
-        return self._is_invalid
-
-    def set_invalid(self, *, is_invalid: bool) -> None:
-        """Show the text as invalid if `is_invalid`, else as valid."""
-        if is_invalid != self._is_invalid:
-            self._is_invalid = is_invalid
-            self.update()
 
     def _line_count(self) -> int:
         lines = 0
@@ -299,11 +288,3 @@ class LongTextField(QWidget):
 
     def sizeHint(self) -> QSize:
         return QSize(240, self.height())
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        theme, painter = self._theme, QPainter(self)
-        edge = "error" if self._is_invalid else "accent" if self.edit.hasFocus() else "controlBorder"
-        fill = theme.colour("sunken" if theme.is_dark else "panel")
-        width = 2.0 if self.edit.hasFocus() else 1.0
-        paint.box(painter, QRectF(self.rect()), theme.radius("control"), fill, theme.colour(edge), width)
-        painter.end()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from PySide6.QtCore import QPoint, QRect, QRectF, QSize, Qt, Signal
+from PySide6.QtCore import QRect, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import (
     QColor,
     QFocusEvent,
@@ -24,6 +24,7 @@ from PySide6.QtWidgets import QFrame, QPlainTextEdit, QTextEdit, QVBoxLayout, QW
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
+from app.ui.widgets.inputs.frame import FieldFrame
 from app.ui.widgets.menus import FieldContextMenu
 
 INDENT = 2
@@ -192,7 +193,7 @@ class JsonLinesEdit(QPlainTextEdit):
         paint.text_line(painter, box, str(number), self.font(), colour, paint.RIGHT)
 
 
-class JsonEdit(QWidget):
+class JsonEdit(FieldFrame):
     """JSON editor in the frame of a field.
 
     `changed` is emitted on every edit, and `submitted` on Ctrl+Enter.
@@ -204,8 +205,7 @@ class JsonEdit(QWidget):
     def __init__(self, theme: Theme, name: str, *, min_lines: int = 6) -> None:
         # `name` is the accessible name; `min_lines` determines the minimum height.
         super().__init__()
-        self._theme, self._min_lines = theme, min_lines
-        self._is_invalid = False
+        self._min_lines = min_lines
         self.edit = JsonLinesEdit(theme)
         self.edit.setAccessibleName(name)
         self.setFocusProxy(self.edit)
@@ -215,7 +215,7 @@ class JsonEdit(QWidget):
         column.addWidget(self.edit)
         self.edit.textChanged.connect(self.changed)
         self.edit.submitted.connect(self.submitted)
-        self.edit.focus_changed.connect(self.update)
+        self.edit.focus_changed.connect(self.update_focus)
 
     def text(self) -> str:
         """Return the text."""
@@ -248,10 +248,9 @@ class JsonEdit(QWidget):
 
     def mark_line(self, line: int) -> None:
         """Mark a line, counted from 1, as invalid; 0 removes the marker."""
-        if line != self.edit.invalid_line or bool(line) != self._is_invalid:
-            self._is_invalid = bool(line)
+        if line != self.edit.invalid_line or bool(line) != self.is_invalid:
             self.edit.mark_line(line)
-            self.update()
+            self.set_invalid(is_invalid=bool(line))
 
     @property
     def invalid_line(self) -> int:
@@ -266,12 +265,3 @@ class JsonEdit(QWidget):
 
     def sizeHint(self) -> QSize:
         return QSize(320, self._height_for(max(self._min_lines, 12)))
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        theme, painter = self._theme, QPainter(self)
-        has_focus = self.edit.hasFocus()
-        edge = "error" if self._is_invalid else "accent" if has_focus else "controlBorder"
-        rect = QRectF(QPoint(0, 0), self.size())
-        fill, width = theme.colour("panel"), 2.0 if has_focus else 1.0
-        paint.box(painter, rect, theme.radius("control"), fill, theme.colour(edge), width)
-        painter.end()

@@ -5,39 +5,33 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal
 
-from PySide6.QtCore import QRectF, QSize, Signal
-from PySide6.QtGui import QFont, QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtCore import QRectF, Qt, Signal
+from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QLayout, QSizePolicy, QWidget
 
 from app.ui.text import plain
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
-from app.ui.widgets.buttons import PaintedButton
+from app.ui.widgets.buttons import Button, Size
 from app.ui.widgets.flow_layout import Flow
 from nep.i18n import _
 
-_HEIGHTS: dict[str, tuple[int, int, str]] = {
-    "small": (24, 10, "body"),
-    "normal": (28, 14, "body"),
-    "form": (32, 14, "label"),
-}
-GAP = 8
+DOT_OVERLAP = -4  # px
+_SIZES: dict[str, Size] = {"small": "smallSegment", "normal": "segment", "form": "formSegment"}
 
 
-class _Segment(PaintedButton):
-    elides_text = True
-
+class _Segment(Button):
     def __init__(self, theme: Theme, label: str, icon: str | None, size: str, check: bool) -> None:
-        self._icon, self._has_check_mark = icon, check
+        self._has_check_mark = check
         self._is_icon_only = self._is_dot_visible = self.reserves_dot = False
-        self._height, self._padding, self._kind = _HEIGHTS[size]
-        super().__init__(theme, label, checkable=True)
+        super().__init__(theme, label, icon, kind="segment", size=_SIZES[size])
+        self.setCheckable(True)
         self.setAutoExclusive(True)
 
     def set_icon_only(self, is_icon_only: bool) -> None:
         # The text becomes the tooltip.
-        self._is_icon_only = is_icon_only and self._icon is not None
+        self._is_icon_only = is_icon_only and self.icon_name is not None
         self.updateGeometry()
         self.update()
 
@@ -52,57 +46,37 @@ class _Segment(PaintedButton):
     def displayed_text(self) -> str:
         return "" if self._is_icon_only else self.text()
 
+    def displayed_icon(self) -> str | None:
+        return "check" if self._has_check_mark and self.isChecked() else self.icon_name
+
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         if self._is_icon_only:
             self.setProperty("shortened", True)
             self.setToolTip(plain.tip(self.text()))
 
-    def _font(self) -> QFont:
-        font = self._theme.font(self._kind)
-        font.setWeight(font.Weight.Medium)
-        return font
+    def _indicator_width(self) -> int:
+        # space for a check mark that isn't shown, and for the dot
+        width = self.icon_side() + self.metrics.gap
+        has_hidden_mark = self._has_check_mark and self.displayed_icon() is None
+        return width * has_hidden_mark + width // 2 * self.reserves_dot
 
-    def _icon_side(self) -> int:
-        return round(self._theme.scaled(16))
+    def width_with(self, text: str) -> int:
+        return super().width_with("" if self._is_icon_only else text)
 
-    def _icons_width(self) -> int:
-        icon_count = int(self._icon is not None) + int(self._has_check_mark) + int(self.reserves_dot) / 2
-        return round((self._icon_side() + GAP) * icon_count) - (GAP if self._is_icon_only else 0)
+    def icon_colour_role(self) -> str:
+        return "text" if self.isChecked() else super().icon_colour_role()
 
-    def sizeHint(self) -> QSize:
-        width = paint.width_of(self._font(), self.displayed_text()) + 2 * self._padding + self._icons_width()
-        return QSize(round(width) + 1, max(self._height, round(paint.height_of(self._font())) + 6))
-
-    def minimumSizeHint(self) -> QSize:
-        return self.sizeHint()
-
-    def paint_button(self, painter: QPainter, rect: QRectF) -> None:
-        theme = self._theme
-        is_checked = self.isChecked()
-        if is_checked:
-            fill = theme.colour("pressed" if theme.is_dark else "panel")
-            paint.box(painter, rect, theme.radius("small"), fill, theme.colour("border"))
-        elif self.is_hovered:
-            paint.box(painter, rect, theme.radius("small"), theme.colour("pressed"))
-        colour = theme.colour(
-            "text" if is_checked else "textSecondary" if self.isEnabled() else "textDisabled"
-        )
-        check_icon = "check" if self._has_check_mark and is_checked else None
-        icons = [name for name in (check_icon, self._icon) if name]
-        text_width = paint.width_of(self._font(), self.displayed_text()) - (GAP if self._is_icon_only else 0)
-        side = self._icon_side()
-        dot = (side + GAP) / 2 if self._is_dot_visible else 0.0
-        left = max(6.0, rect.center().x() - (text_width + len(icons) * (side + GAP) + dot) / 2)
-        for name in icons:
-            paint_icon(painter, QRectF(left, rect.center().y() - side / 2, side, side), name, colour)
-            left += side + GAP
-        paint.text_line(
-            painter, rect.adjusted(left, 0, 2 - dot, 0), self.displayed_text(), self._font(), colour
-        )
+    def paintEvent(self, event: QPaintEvent) -> None:
+        super().paintEvent(event)
         if self._is_dot_visible:
-            dot_rect = QRectF(left + text_width + GAP - 2, rect.center().y() - dot / 2, dot, dot)
-            paint_icon(painter, dot_rect, "dot", theme.colour("ok"))
+            painter, side = QPainter(self), self.icon_side() * 0.75
+            text_width = paint.width_of(self.font(), self.text())
+            icon_width = self._icon_width(self.text()) if self.displayed_icon() else 0
+            left = (self.width() + icon_width + text_width) / 2 - DOT_OVERLAP
+            dot_rect = QRectF(left, (self.height() - side) / 2, side, side)
+            paint_icon(painter, dot_rect, "dot", self._theme.colour("ok"))
+            painter.end()
 
 
 class Segments(QWidget):
@@ -125,7 +99,7 @@ class Segments(QWidget):
         # `options` are (value, label, icon or None); `check` shows a check mark at the selected one; `wraps`
         # uses several rows if narrow.
         super().__init__()
-        self._theme = theme
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setAccessibleName(name)
         row: QLayout
         if wraps:
@@ -179,11 +153,3 @@ class Segments(QWidget):
             segment.setAutoExclusive(False)
             segment.setChecked(False)
             segment.setAutoExclusive(True)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        theme = self._theme
-        rect = QRectF(self.rect())
-        edge = theme.colour("border") if theme.is_dark or theme.is_high_contrast else None
-        paint.box(painter, rect, theme.radius("panel"), theme.colour("sunken"), edge)
-        painter.end()

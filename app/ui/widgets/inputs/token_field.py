@@ -14,6 +14,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.buttons import PaintedButton
 from app.ui.widgets.flow_layout import Flow
+from app.ui.widgets.inputs.frame import FieldFrame
 from app.ui.widgets.keyboard import has_no_modifiers
 from app.ui.widgets.menus import FieldContextMenu
 from nep.i18n import _
@@ -110,7 +111,7 @@ class _TokenEdit(QLineEdit):
         self.focus_changed.emit()
 
 
-class TokenField(QWidget):
+class TokenField(FieldFrame):
     """Base class of token fields. Subclasses decide when typed text becomes a token.
 
     `changed` is emitted when the tokens or the typed text change, and `editing_finished` when the tokens have
@@ -129,7 +130,7 @@ class TokenField(QWidget):
     def __init__(self, theme: Theme, name: str, example: str, add_placeholder: str = "") -> None:
         super().__init__()
         self._add_placeholder = add_placeholder
-        self._theme, self._example, self._is_invalid = theme, example, False
+        self._theme, self._example = theme, example
         self._tokens: list[Token] = []
         self.edit = _TokenEdit(self)
         self.edit.setAccessibleName(name)
@@ -142,7 +143,7 @@ class TokenField(QWidget):
         self.edit.textChanged.connect(self.edit.updateGeometry)
         self.edit.completed.connect(self._end_typing)
         self.edit.backspace_pressed.connect(self._remove_last)
-        self.edit.focus_changed.connect(self.update)
+        self.edit.focus_changed.connect(self.update_focus)
         self.setFocusProxy(self.edit)
         self._flow = Flow(self, gap=GAP, row_gap=4)
         self._flow.setContentsMargins(PADDING, 5, PADDING, 5)
@@ -152,11 +153,6 @@ class TokenField(QWidget):
     def tokens(self) -> Sequence[Token]:
         """Tokens in the order in which they are shown."""
         return tuple(self._tokens)
-
-    def set_invalid(self, is_invalid: bool) -> None:
-        """Show the field as invalid if ``is_invalid``, else as valid."""
-        self._is_invalid = is_invalid
-        self.update()
 
     # ---- input
 
@@ -208,11 +204,3 @@ class TokenField(QWidget):
     def mousePressEvent(self, event: QMouseEvent) -> None:
         self.edit.setFocus(Qt.FocusReason.MouseFocusReason)
         event.accept()
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        theme, painter = self._theme, QPainter(self)
-        has_focus = self.edit.hasFocus()
-        edge = "error" if self._is_invalid else "accent" if has_focus else "controlBorder"
-        fill, width = theme.colour("sunken" if theme.is_dark else "panel"), 2.0 if has_focus else 1.0
-        paint.box(painter, QRectF(self.rect()), theme.radius("control"), fill, theme.colour(edge), width)
-        painter.end()

@@ -11,6 +11,7 @@ from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import label
 from app.ui.widgets.flow_layout import Flow
+from app.ui.widgets.inputs.frame import set_invalid
 from app.ui.widgets.menus import FieldContextMenu
 from nep.i18n import _
 
@@ -50,7 +51,7 @@ class ValueFields(QWidget):
             value = values.get(name, "")
             if field.text() != value:
                 field.setText(value)
-            self._set_invalid(field, is_invalid=not value.strip())
+            set_invalid(field, is_invalid=not value.strip())
 
     def _rebuild(self, names: Sequence[str]) -> None:
         focused_name = next((name for name, field in self.fields.items() if field.hasFocus()), "")
@@ -87,10 +88,3 @@ class ValueFields(QWidget):
         self._flow.addWidget(part)
         self._parts.append(part)
         self.fields[name] = field
-
-    @staticmethod
-    def _set_invalid(field: QLineEdit, *, is_invalid: bool) -> None:
-        if (field.property("wrong") == "true") != is_invalid:
-            field.setProperty("wrong", "true" if is_invalid else "false")
-            field.style().unpolish(field)
-            field.style().polish(field)

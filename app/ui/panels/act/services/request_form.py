@@ -13,6 +13,7 @@ from app.core.run.acting.json_text import parse_typed_value
 from app.robots.description.typed_number import TypedNumberError, parse_number
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Switch, label
+from app.ui.widgets.inputs.frame import set_invalid
 from app.ui.widgets.menus import FieldContextMenu
 from nep.i18n import _, lazy
 
@@ -117,7 +118,7 @@ class RequestForm(QWidget):
             field.hasFocus() and self._parse_value(name, field.text()) == (value,)
         ):
             field.setText(text)
-        self._set_invalid(field, is_invalid=False)
+        set_invalid(field, is_invalid=False)
 
     def _rebuild(self, kinds: Mapping[str, str]) -> None:
         while (item := self._grid.takeAt(0)) is not None:
@@ -154,12 +155,12 @@ class RequestForm(QWidget):
             template = TYPE_ERRORS["separators" if self._has_separators(name, text) else self._kinds[name]]
             self.problems[name] = _(template).format(name=name, example="[1, 2]")
             if isinstance(field, QLineEdit):
-                self._set_invalid(field, is_invalid=True)
+                set_invalid(field, is_invalid=True)
             self.typed.emit(dict(self._request))
         else:
             self.problems.pop(name, None)
             if isinstance(field, QLineEdit):
-                self._set_invalid(field, is_invalid=False)
+                set_invalid(field, is_invalid=False)
             self._set_value(name, parsed[0])
 
     def _parse_value(self, name: str, text: str) -> tuple[object] | None:
@@ -189,10 +190,3 @@ class RequestForm(QWidget):
     def _set_value(self, name: str, value: object) -> None:
         self._request = {**self._request, name: value}
         self.typed.emit(dict(self._request))
-
-    @staticmethod
-    def _set_invalid(field: QLineEdit, *, is_invalid: bool) -> None:
-        if (field.property("wrong") == "true") != is_invalid:
-            field.setProperty("wrong", "true" if is_invalid else "false")
-            field.style().unpolish(field)
-            field.style().polish(field)

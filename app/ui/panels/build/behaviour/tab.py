@@ -20,6 +20,7 @@ from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.buttons import PaintedButton
+from app.ui.widgets.inputs.frame import set_invalid
 from app.ui.widgets.menus import FieldContextMenu
 from nep.i18n import _
 
@@ -286,11 +287,7 @@ class NameField(QLineEdit):
             self.exited.emit()
 
     def _show_problem(self, problem: str) -> None:
-        property_value = "true" if problem else ""
-        if self.property("wrong") != property_value:
-            self.setProperty("wrong", property_value)
-            self.style().unpolish(self)
-            self.style().polish(self)
+        set_invalid(self, is_invalid=bool(problem))
         self.setAccessibleDescription(problem)
         if problem:
             paint.announce(self, problem)

@@ -79,7 +79,8 @@ class StepRow(QWidget):
         self, theme: Theme, number: int, step: TutorialStep, show_me: Callable[[TutorialStep], None]
     ) -> None:
         super().__init__()
-        self._theme, self.step = theme, step
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        self.step = step
         self.mark = _StepMark(theme, number)
         self.text_label = label(with_block_names(step.text), "bodyLarge", wrap=True)
         self.hint = label(with_block_names(step.hint), "body", role="textSecondary", wrap=True)
@@ -112,20 +113,12 @@ class StepRow(QWidget):
         set_role(self.text_label, "textSecondary" if state == "done" else "text")
         template = {"done": _("{step}: done"), "next": _("{step}: the next step"), "later": "{step}"}[state]
         self.setAccessibleName(template.format(step=self.text_label.text()))
-        self.update()
+        paint.set_style_property(self, "state", state)
         self.mark.update()
 
     def show_hint(self, *, is_detached: bool) -> None:
         """Show where to find the block; if `is_detached` is True, that it must be attached to the script."""
         self.hint.setText(with_block_names(DETACHED_HINT if is_detached else self.step.hint))
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        if self.mark.state == "next":
-            painter = QPainter(self)
-            paint.box(
-                painter, QRectF(self.rect()), self._theme.radius("panel"), self._theme.colour("accentTint")
-            )
-            painter.end()
 
 
 def with_block_names(text: str) -> str:

@@ -272,7 +272,7 @@ class RecordingDetails(QWidget):
             )
             names = all_names if part is None else part.topics or all_names
             self.topic_list.show_topics(preview.topics, names, preview.size_of)
-        self.topics_field.set_invalid(part is None)
+        self.topics_field.set_invalid(is_invalid=part is None)
         set_role(self.part_label, "error" if part is None else "textSecondary")
         self._update_size(preview, part)
         self._update_export_path()

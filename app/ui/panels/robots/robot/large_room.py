@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import QEvent, QObject, Qt, Signal
-from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
+from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QMainWindow, QVBoxLayout, QWidget
 
 from app.ui.theme.theme import Theme
@@ -27,7 +27,8 @@ class LargeRoom(QWidget):
     def __init__(self, theme: Theme, panel: QWidget, stage: QWidget, buttons: Sequence[QWidget] = ()) -> None:
         workbench = _workbench_of(panel)
         super().__init__(workbench)
-        self._theme, self._workbench = theme, workbench
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        self._workbench = workbench
         self.is_full_screen = False
         self.setAccessibleName(_("Large room"))
         self.screen_button = Button(theme, _("Full screen"), "fullscreen", size="small")
@@ -99,11 +100,6 @@ class LargeRoom(QWidget):
             self.dispose()
         else:
             super().keyPressEvent(event)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.fillRect(self.rect(), self._theme.colour("panel"))
-        painter.end()
 
 
 def _workbench_of(panel: QWidget) -> QWidget:

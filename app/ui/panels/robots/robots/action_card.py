@@ -62,7 +62,8 @@ class ActionCard(Card):
         pictures: ImageSource | None = None,
         title_of: Callable[[str], str] = str,
     ) -> None:
-        super().__init__(theme)
+        super().__init__()
+        self._theme = theme
         self.action = action
         self._title_of = title_of
         self._is_running = False
@@ -139,10 +140,7 @@ class ActionCard(Card):
         Args:
             is_highlighted: True for the highlighted card.
         """
-        border = "accent" if is_highlighted else "border"
-        if border != self.border:
-            self.border = border
-            self.update()
+        self.set_accented(is_highlighted)
         self.try_button.set_kind("primary" if is_highlighted and not self._is_running else "plain")
         self.try_button.has_filled_icon = is_highlighted
 
@@ -200,7 +198,7 @@ class ActionCard(Card):
         template = _("Cancel {action}") if can_cancel else _("Try {action}")
         self.try_button.setAccessibleName(template.format(action=self.action.title))
         self.try_button.setEnabled(can_cancel or not self._is_running)
-        self.set_highlighted(self.border == "accent")
+        self.set_highlighted(self.is_accented)
         fraction, text, remaining = None, "", ""
         if invocation is not None and self._is_running:
             fraction = progress_of(

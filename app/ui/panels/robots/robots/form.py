@@ -24,6 +24,7 @@ from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Segments, label
 from app.ui.widgets.inputs.fields import LongTextField
+from app.ui.widgets.inputs.frame import set_invalid
 from nep.i18n import _
 
 LABEL_WIDTH = 92
@@ -204,10 +205,8 @@ class ActionForm(QWidget):
             widget.set_invalid(is_invalid=is_invalid)
             return
         for field in [widget, *widget.findChildren(QLineEdit)]:
-            if isinstance(field, QLineEdit) and (field.property("wrong") == "true") != is_invalid:
-                field.setProperty("wrong", "true" if is_invalid else "false")
-                field.style().unpolish(field)
-                field.style().polish(field)
+            if isinstance(field, QLineEdit):
+                set_invalid(field, is_invalid=is_invalid)
 
     def summary(self) -> str:
         """Return a short description of the input, such as "happy, for 2 s"."""

@@ -151,7 +151,7 @@ class RobotList(QWidget):
         self._column.addWidget(self._make_help_card(run))
 
     def _make_help_card(self, run: Callable[[str], object]) -> QWidget:
-        card = Card(self._theme, fill="sunken")
+        card = Card(is_sunken=True)
         column = QVBoxLayout(card)
         column.setContentsMargins(14, 12, 14, 12)
         column.setSpacing(6)

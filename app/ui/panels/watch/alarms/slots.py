@@ -14,6 +14,7 @@ from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.buttons import PaintedButton
+from app.ui.widgets.inputs.frame import set_invalid
 from app.ui.widgets.keyboard import has_no_modifiers, next_in_focus_chain
 from app.ui.widgets.menus import FieldContextMenu
 
@@ -241,10 +242,8 @@ class SlotField(QLineEdit):
         return is_valid
 
     def _set_invalid(self, *, is_invalid: bool) -> None:
-        if self.property("wrong") != ("true" if is_invalid else ""):
-            self.setProperty("wrong", "true" if is_invalid else "")
-            self.style().unpolish(self)
-            self.style().polish(self)
+        if (self.property("wrong") == "true") != is_invalid:
+            set_invalid(self, is_invalid=is_invalid)
             self.setToolTip(plain.tip(self._rejection) if is_invalid else "")
             if is_invalid and self.hasFocus():
                 QToolTip.showText(self.mapToGlobal(self.rect().bottomLeft()), self.toolTip(), self)

@@ -27,6 +27,7 @@ from app.ui.widgets import (
     Separator,
     Sparkline,
     label,
+    set_role,
 )
 from app.ui.widgets.buttons import LinkButton
 from app.ui.widgets.flow_layout import Flow
@@ -240,7 +241,7 @@ class GraphCard(QWidget):
                 old.deleteLater()
         self._stat_boxes = [_StatBox(self._theme) for _stat in content.stats]
         if self._stat_boxes:
-            card = Card(self._theme)
+            card = Card()
             grid = QGridLayout(card)
             grid.setContentsMargins(12, 8, 12, 8)
             grid.setHorizontalSpacing(12)
@@ -291,11 +292,7 @@ class _StatBox(QWidget):
         self._note.setText(stat.note)
         self._curve.set_values(stat.curve)
         self._curve.setVisible(len(stat.curve) > 1)
-        role = "warn" if stat.is_problem else "text"
-        if self._value.property("role") != role:
-            self._value.setProperty("role", role)
-            self._value.style().unpolish(self._value)
-            self._value.style().polish(self._value)
+        set_role(self._value, "warn" if stat.is_problem else "text")
         self.setAccessibleName(f"{stat.title}: {stat.value}")
 
 

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QHBoxLayout, QWidget
 from app.ui.panels.watch.inspector.values import search
 from app.ui.theme.theme import Theme
 from app.ui.widgets import IconButton, SearchField, paint
+from app.ui.widgets.inputs.frame import set_invalid
 from app.ui.widgets.keyboard import has_no_modifiers
 from nep.i18n import _, pgettext
 
@@ -202,6 +203,4 @@ class FindBar(QWidget):
         Args:
             is_invalid: True if there is no match or the query is invalid.
         """
-        self.field.setProperty("wrong", "true" if is_invalid else "false")
-        self.field.style().unpolish(self.field)
-        self.field.style().polish(self.field)
+        set_invalid(self.field, is_invalid=is_invalid)

@@ -19,6 +19,7 @@ from app.core.networks.parameters import (
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, ComboBox, ElidedLabel, Separator, label, paint, set_role
+from app.ui.widgets.inputs.frame import set_invalid
 from app.ui.widgets.menus import FieldContextMenu
 from app.ui.widgets.table.model import Cell, Column, TableModel
 from app.ui.widgets.table.view import TableView
@@ -280,10 +281,7 @@ class ValueField(QLineEdit):
         Args:
             is_invalid: True if the value is invalid.
         """
-        if (self.property("wrong") == "true") is not is_invalid:
-            self.setProperty("wrong", "true" if is_invalid else "false")
-            self.style().unpolish(self)
-            self.style().polish(self)
+        set_invalid(self, is_invalid=is_invalid)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:

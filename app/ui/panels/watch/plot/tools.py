@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QEvent, QPoint, QRectF, Qt, QTimer, Signal
-from PySide6.QtGui import QFocusEvent, QKeyEvent, QPainter, QPaintEvent
+from PySide6.QtCore import QEvent, QPoint, Qt, QTimer, Signal
+from PySide6.QtGui import QFocusEvent, QKeyEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.core.messages.reader import LARGE_BYTES, read
@@ -20,9 +20,10 @@ from app.ui.panels.watch.plot.plotted_curve import value_text
 from app.ui.panels.watch.plot.time_view import SPANS
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
-from app.ui.widgets import MenuButton, Segments, ToggleButton, label, paint
+from app.ui.widgets import MenuButton, Segments, ToggleButton, label, paint, set_role
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.inputs.fields import SearchField
+from app.ui.widgets.inputs.frame import set_invalid
 from app.ui.widgets.lists.entry_list import EntryList, Heading, Line
 from app.ui.widgets.lists.fuzzy import Entry, Finder, Match, match
 from nep.i18n import _, lazy, ngettext
@@ -101,7 +102,7 @@ class _MatchPopup(QWidget):
 
     def __init__(self, theme: Theme, parent: QWidget) -> None:
         super().__init__(parent)
-        self._theme = theme
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.list = EntryList(theme, _("Matching fields"))
         self.footer = label("", "small", role="textTertiary")
         self.footer.setContentsMargins(14, 2, 10, 5)
@@ -111,12 +112,6 @@ class _MatchPopup(QWidget):
         column.addWidget(self.list, 1)
         column.addWidget(self.footer)
         self.hide()
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        theme, painter = self._theme, QPainter(self)
-        rect = QRectF(self.rect())
-        paint.box(painter, rect, theme.radius("panel"), theme.colour("raised"), theme.colour("borderStrong"))
-        painter.end()
 
 
 class AddCurveField(SearchField):
@@ -205,9 +200,7 @@ class AddCurveField(SearchField):
             message: Reason; "" removes the message.
         """
         self.error_message = message
-        self.setProperty("wrong", "true" if message else "false")
-        self.style().unpolish(self)
-        self.style().polish(self)
+        set_invalid(self, is_invalid=bool(message))
         self._update_footer(0)
 
     # -- matches ------------------------------------------------------------------------------------------
@@ -272,9 +265,7 @@ class AddCurveField(SearchField):
         hint = _("Tab completes; Enter adds to the left axis, Shift+Enter to the right one")
         count_text = ngettext("{count} field", "{count} fields", count).format(count=count)
         self._matches.footer.setText(self.error_message or f"{hint} · {count_text}")
-        self._matches.footer.setProperty("role", "error" if self.error_message else "textTertiary")
-        self._matches.footer.style().unpolish(self._matches.footer)
-        self._matches.footer.style().polish(self._matches.footer)
+        set_role(self._matches.footer, "error" if self.error_message else "textTertiary")
 
     def _position_matches(self, has_lines: bool) -> None:
         matches = self.matches

@@ -8,7 +8,8 @@ from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QWidget
 
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
-from app.ui.widgets import IconButton, paint
+from app.ui.widgets import IconButton
+from app.ui.widgets.inputs.frame import FieldFrame
 from app.ui.widgets.menus import FieldContextMenu
 
 _PADDING, _BUTTON = 10, 26
@@ -39,7 +40,7 @@ class _ReadOnlyLine(QLineEdit):
         self.focus_changed.emit()
 
 
-class CopyField(QWidget):
+class CopyField(FieldFrame):
     """Read-only field with a copy button; the button and Ctrl+C emit `copy_requested`."""
 
     copy_requested = Signal()
@@ -57,7 +58,7 @@ class CopyField(QWidget):
         self.copy = IconButton(theme, "copy", copy_name, size=_BUTTON)
         self.copy.clicked.connect(self.copy_requested)
         self.line.copy_requested.connect(self.copy_requested)
-        self.line.focus_changed.connect(self.update)
+        self.line.focus_changed.connect(self.update_focus)
         self.setFocusProxy(self.line)
         row = QHBoxLayout(self)
         row.setContentsMargins(_PADDING, 2, 4, 2)
@@ -94,14 +95,6 @@ class CopyField(QWidget):
 
     def minimumSizeHint(self) -> QSize:
         return QSize(round(self._theme.scaled(140)), self.sizeHint().height())
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        theme, painter = self._theme, QPainter(self)
-        has_focus = self.line.hasFocus()
-        edge, width = theme.colour("accent" if has_focus else "controlBorder"), 2.0 if has_focus else 1.0
-        fill = theme.colour("sunken" if theme.is_dark else "panel")
-        paint.box(painter, QRectF(self.rect()), theme.radius("control"), fill, edge, width)
-        painter.end()
 
 
 class RoleIcon(QWidget):

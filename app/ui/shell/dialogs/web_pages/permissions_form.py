@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from PySide6.QtCore import QRectF, Qt, Signal
-from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from app.core.network.web_pages import WebPages
 from app.ui.shell.dialogs.web_pages.access_form import LABEL_WIDTH
 from app.ui.shell.dialogs.web_pages.fields import RoleIcon
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Button, label, paint, set_role
+from app.ui.widgets import Button, label, set_role
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.inputs.check_box import CheckBox
 from app.ui.widgets.inputs.token_field import Token, TokenField
@@ -29,7 +28,6 @@ class OriginField(TokenField):
     def __init__(self, theme: Theme, web: WebPages) -> None:
         super().__init__(theme, _("Origins"), EXAMPLE_ORIGIN, _("Add an origin"))
         self._web = web
-        self.is_invalid = False
 
     def show_origins(self, origins: Sequence[str]) -> None:
         """Set the tokens to the given origins. Text that is being typed is preserved."""
@@ -42,7 +40,7 @@ class OriginField(TokenField):
         self._arrange()
 
     def _on_edited(self, text: str) -> None:
-        self._set_invalid(invalid=False)
+        self.set_invalid(is_invalid=False)
         if text.strip() and text[-1] in " ,":
             self._end_typing()
         self.changed.emit()
@@ -56,30 +54,20 @@ class OriginField(TokenField):
                 rejected.append(origin)
         self.edit.setText(" ".join(rejected))
         self.show_origins(self._web.origins)
-        self._set_invalid(invalid=bool(rejected))
+        self.set_invalid(is_invalid=bool(rejected))
         self.editing_finished.emit()
 
     def _remove(self, token: Token) -> None:
         self._web.set_origins([each.entry for each in self.tokens if each is not token])
         super()._remove(token)
 
-    def _set_invalid(self, *, invalid: bool) -> None:
-        self.is_invalid = invalid
-        self.set_invalid(invalid)
-
 
 class _ReadOnlyRow(QWidget):
     """Framed row with read-only contents."""
 
-    def __init__(self, theme: Theme) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self._theme = theme
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter, theme = QPainter(self), self._theme
-        fill, edge = theme.colour("sunken"), theme.colour("borderStrong")
-        paint.box(painter, QRectF(self.rect()), theme.radius("control"), fill, edge)
-        painter.end()
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
 
 
 class RobotChoice(QWidget):
@@ -101,7 +89,7 @@ class RobotChoice(QWidget):
         self._flow = Flow(self.list, gap=16, row_gap=2)
         self._flow.setContentsMargins(2, 4, 2, 0)
         self._flow.addWidget(self.no_robots_label)
-        line = _ReadOnlyRow(theme)
+        line = _ReadOnlyRow()
         row = QHBoxLayout(line)
         row.setContentsMargins(10, 2, 3, 2)
         row.setSpacing(8)

@@ -16,6 +16,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, label, paint
 from app.ui.widgets.buttons import PaintedButton
 from app.ui.widgets.flow_layout import Flow
+from app.ui.widgets.inputs.frame import set_invalid
 from nep.i18n import _, lazy
 
 _HEX_PATTERN = re.compile(r"#?([0-9a-fA-F]{6})")
@@ -288,9 +289,7 @@ class ColourChoice(QWidget):
         is_visible = bool(message) and not is_quiet
         self._error_label.setText(message if is_visible else "")
         self._error_label.setVisible(is_visible)
-        self.field.setProperty("wrong", "true" if is_visible else "false")
-        self.field.style().unpolish(self.field)
-        self.field.style().polish(self.field)
+        set_invalid(self.field, is_invalid=is_visible)
 
 
 def colour_control(theme: Theme, parameter: Parameter) -> Control:
