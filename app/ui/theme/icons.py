@@ -100,6 +100,7 @@ def _cached_pixmap(
     height: float,
     rgba: int,
     ratio: float,
+    *,
     is_filled: bool = False,
     is_trailing: bool = False,
 ) -> QPixmap:
@@ -163,7 +164,9 @@ class IconEngine(QIconEngine):
 
     def scaledPixmap(self, size: QSize, mode: QIcon.Mode, state: QIcon.State, scale: float) -> QPixmap:
         width, height, rgba = size.width(), size.height(), self._colour(mode, state).rgba()
-        return _cached_pixmap(self._name, width, height, rgba, scale, self._is_filled, self._is_trailing)
+        return _cached_pixmap(
+            self._name, width, height, rgba, scale, is_filled=self._is_filled, is_trailing=self._is_trailing
+        )
 
     def key(self) -> str:
         return f"nep:{self._name}"

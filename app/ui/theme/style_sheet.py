@@ -32,7 +32,6 @@ class ButtonColours(NamedTuple):
 
 BUTTON_COLOURS: Mapping[str, ButtonColours] = {
     "plain": ButtonColours("panel", "hover", "pressed", "borderStrong", "text"),
-    "toggle": ButtonColours("panel", "hover", "pressed", "borderStrong", "text"),
     "ghost": ButtonColours(None, "hover", "pressed", None, "text"),
     "link": ButtonColours(None, None, None, None, "accentText"),
     "segment": ButtonColours(None, "pressed", None, None, "textSecondary"),
@@ -44,15 +43,13 @@ BUTTON_COLOURS: Mapping[str, ButtonColours] = {
 }
 """Colours of buttons by kind."""
 
-# kind of text, weight and radius of buttons by the property ``metrics``
+# kind of text, weight and radius of buttons by the property ``metrics``; "" if it isn't set
 _BUTTON_FONTS = {
+    "": ("body", 500, "control"),
     "small": ("body", 500, "small"),
-    "normal": ("body", 500, "control"),
     "form": ("label", None, "control"),
     "large": ("button", None, "large"),
     "link": ("title", None, "small"),
-    "smallSegment": ("body", 500, "small"),
-    "segment": ("body", 500, "small"),
     "formSegment": ("label", 500, "small"),
 }
 
@@ -115,9 +112,10 @@ QMenu::scroller {{ height: 22px; background: transparent; }}
 QMenu::indicator {{ width: 16px; height: 16px; padding-left: 8px; }}
 
 Button {{ padding: 0 3px; }}
-Button[kind="toggle"]:checked:enabled {{
+ToggleButton:checked:enabled {{
     background: {selected}; border-color: {accent}; color: {selectedText};
 }}
+Button[kind="segment"] {{ border-radius: {small}px; }}
 Button[kind="segment"]:checked {{ background: {segment}; border: 1px solid {border}; color: {text}; }}
 Button[kind="link"] {{ padding: 0; }}
 Button[kind="link"]:hover {{ text-decoration: underline; }}
@@ -142,6 +140,10 @@ ArmedStrip[armed="true"] {{ background: {warnTint}; }}
 ProblemRow:hover {{ background: {hover}; border-radius: {small}px; margin: 1px 4px; }}
 StepRow[state="next"] {{ background: {accentTint}; border-radius: {panel_radius}px; }}
 Segments {{ background: {sunken}; border: {segments_border}; border-radius: {panel_radius}px; }}
+IconLabel[tile="empty"] {{ background: {sunken}; border-radius: {palette}px; margin-bottom: 16px; }}
+IconLabel[tile="warn"] {{
+    background: {warnTint}; border: 1px solid {warnBorder}; border-radius: {panel_radius}px;
+}}
 QLabel[keyCap="true"] {{ background: {sunken}; border-radius: {key}px; padding: 2px 6px; }}
 
 FieldFrame {{ background: {field}; border: 1px solid {controlBorder}; border-radius: {control}px; }}
@@ -215,27 +217,35 @@ def _label_rules(theme: ThemeValues) -> str:
 
 
 def _button_rules(theme: ThemeValues) -> str:
+    # Rules without an attribute are for the kind "plain" and the size "normal": each attribute and each rule
+    # makes the creation of buttons slower.
     def background(role: str | None) -> str:
         return f"background: {theme.hex(role) if role else 'transparent'};"
 
     rules = []
     for name, (kind_name, weight, radius) in _BUTTON_FONTS.items():
         kind = theme.text_kinds()[kind_name]
+        selector = f'Button[metrics="{name}"]' if name else "Button"
         rules.append(
-            f'Button[metrics="{name}"] {{ border-radius: {theme.radius(radius)}px;'
-            f" font-size: {round(theme.scaled(kind.size_px))}px; font-weight: {weight or kind.weight}; }}"
+            f"{selector} {{ border-radius: {theme.radius(radius)}px; font-weight: {weight or kind.weight};"
+            f" font-size: {round(theme.scaled(kind.size_px))}px; }}"
         )
     for name, colours in BUTTON_COLOURS.items():
-        selector = f'Button[kind="{name}"]'
+        selector = f'Button[kind="{name}"]' if name != "plain" else "Button"
         border = f"border: 1px solid {theme.hex(colours.border)};" if colours.border else "border: none;"
-        disabled_border = "border" if colours.border or colours.fill else None
-        rules += (
-            f"{selector} {{ {background(colours.fill)} color: {theme.hex(colours.text)}; {border} }}",
-            f"{selector}:hover {{ {background(colours.hovered)} }}",
-            f"{selector}:pressed, {selector}:checked {{ {background(colours.pressed)} }}",
-            f"{selector}:disabled {{ background: transparent; color: {theme.hex('textDisabled')};"
-            + (f" border: 1px solid {theme.hex(disabled_border)};" if disabled_border else "")
-            + " }",
+        rules.append(
+            f"{selector} {{ {background(colours.fill)} color: {theme.hex(colours.text)}; {border} }}"
+        )
+        if colours.hovered != colours.fill:
+            rules.append(f"{selector}:hover {{ {background(colours.hovered)} }}")
+        if colours.pressed != colours.hovered:
+            rules.append(f"{selector}:pressed, {selector}:checked {{ {background(colours.pressed)} }}")
+        elif colours.pressed != colours.fill:
+            rules.append(f"{selector}:checked {{ {background(colours.pressed)} }}")
+        is_flat = colours.border is None and colours.fill is None
+        border = "" if is_flat else f" border: 1px solid {theme.hex('border')};"
+        rules.append(
+            f"{selector}:disabled {{ background: transparent; color: {theme.hex('textDisabled')};{border} }}"
         )
     return "\n".join(rules)
 

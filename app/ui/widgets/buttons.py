@@ -28,7 +28,7 @@ from app.ui.widgets import paint
 from app.ui.widgets.keyboard import has_no_modifiers
 from nep.i18n import _
 
-Kind = Literal["plain", "primary", "ghost", "run", "stop", "toggle", "link", "segment", "recording", "replay"]
+Kind = Literal["plain", "primary", "ghost", "run", "stop", "link", "segment", "recording", "replay"]
 Size = Literal["small", "normal", "form", "large", "link", "smallSegment", "segment", "formSegment"]
 CHEVRON, CHEVRON_GAP = 14, 6
 QT_ICON_GAP = 2  # px that Qt adds between the icon and the text of a QPushButton
@@ -206,8 +206,10 @@ class Button(QPushButton):
         """Colour role of the icon; "" for the colour of the text."""
         self._min_width: int | None = None
         self.set_text(text)
-        self.setProperty("kind", kind)
-        self.setProperty("metrics", size)
+        if kind != "plain":
+            self.setProperty("kind", kind)
+        if size not in {"normal", "segment"}:
+            self.setProperty("metrics", size)
         set_up_button(self, theme, self.metrics.radius)
 
     def set_text(self, text: str, name: str = "") -> None:
@@ -340,7 +342,7 @@ class ToggleButton(Button):
     """Checkable button, in the colours of a selection while it is checked."""
 
     def __init__(self, theme: Theme, text: str, icon: str) -> None:
-        super().__init__(theme, text, icon, kind="toggle", size="small")
+        super().__init__(theme, text, icon, size="small")
         self.setCheckable(True)
 
     def icon_colour_role(self) -> str:

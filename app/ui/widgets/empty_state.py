@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from PySide6.QtCore import QRectF, QSize, Qt
-from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from app.ui.text import plain
-from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
-from app.ui.widgets import paint
 from app.ui.widgets.buttons import Button
-from app.ui.widgets.labels import label
+from app.ui.widgets.labels import IconLabel, label
 from app.ui.widgets.lists.scroll_areas import ContentScrollArea
 
 TILE_SIZE, BELOW_TILE = 56, 16
@@ -40,24 +38,6 @@ class EmptyAction:
     is_primary: bool = False
 
 
-class _Tile(QWidget):
-    def __init__(self, theme: Theme, icon: str) -> None:
-        super().__init__()
-        self._theme, self.icon = theme, icon
-        self.setFixedSize(TILE_SIZE, TILE_SIZE + BELOW_TILE)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        theme = self._theme
-        painter = QPainter(self)
-        paint.box(
-            painter, QRectF(0, 0, TILE_SIZE, TILE_SIZE), theme.radius("palette"), theme.colour("sunken")
-        )
-        side = theme.size("icon", "empty")
-        icon_rect = QRectF((TILE_SIZE - side) / 2, (TILE_SIZE - side) / 2, side, side)
-        paint_icon(painter, icon_rect, self.icon, theme.colour("textSecondary"))
-        painter.end()
-
-
 class EmptyState(QWidget):
     """Placeholder with an icon, a title, one or two lines of text, and up to two buttons."""
 
@@ -67,7 +47,9 @@ class EmptyState(QWidget):
         super().__init__()
         self._theme = theme
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self._tile = _Tile(theme, icon)
+        self._tile = IconLabel(theme, icon, side=theme.size("icon", "empty"), scales=False)
+        self._tile.setProperty("tile", "empty")
+        self._tile.setFixedSize(TILE_SIZE, TILE_SIZE + BELOW_TILE)
         self._title = label(title, "empty", wrap=True)
         self._text = label(text, "bodyLarge", role="textSecondary", wrap=True)
         for text_label in (self._title, self._text):
@@ -104,8 +86,7 @@ class EmptyState(QWidget):
         self._title.setText(title)
         self._text.setText(text)
         if icon is not None:
-            self._tile.icon = icon
-            self._tile.update()
+            self._tile.set_icon(icon, "textSecondary")
         self._update_visibility()
 
     def _update_visibility(self) -> None:

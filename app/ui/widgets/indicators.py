@@ -24,6 +24,7 @@ from app.ui.text import plain
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
+from app.ui.widgets.labels import IconLabel
 from nep.i18n import _, lazy
 
 CHIP_HEIGHT, CHIP_PADDING, CHIP_GAP = 22, 8, 5
@@ -182,32 +183,23 @@ class Chip(QWidget):
         painter.end()
 
 
-class StatusIcon(QWidget):
+class StatusIcon(IconLabel):
     """Icon of a status, next to a text with the same meaning."""
 
     def __init__(self, theme: Theme, status: str = "off", *, height: int = 0, colour: str = "") -> None:
         # `height` is that of the adjacent line of text (0: the icon's own); `colour` overrides the default.
-        super().__init__()
-        self._theme, self._status, self._height, self._colour = theme, "", height, colour
+        self._colour = colour
+        super().__init__(theme, theme.status(status).icon, colour or theme.status(status).colour, ICON_SIZE)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.set(status)
+        if height:
+            self.setFixedHeight(height)
+        self.setAccessibleName(status_name(status))
 
     def set(self, status: str) -> None:
         """Set the status, which determines icon, colour and accessible name."""
-        if status != self._status:
-            self._status = status
-            self.setAccessibleName(status_name(status))
-            self.update()
-
-    def sizeHint(self) -> QSize:
-        side = round(self._theme.scaled(ICON_SIZE))
-        return QSize(side, self._height or side)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        status, painter = self._theme.status(self._status), QPainter(self)
-        icon_rect = QRectF(0, (self.height() - self.width()) / 2, self.width(), self.width())
-        paint_icon(painter, icon_rect, status.icon, self._theme.colour(self._colour or status.colour))
-        painter.end()
+        values = self._theme.status(status)
+        self.set_icon(values.icon, self._colour or values.colour)
+        self.setAccessibleName(status_name(status))
 
 
 class StatusItem(QWidget):

@@ -1,8 +1,8 @@
-"""Labels with the font of a kind and the colour of a role, and separators."""
+"""Labels for texts and icons, with the font of a kind and the colour of a role, and separators."""
 
 from __future__ import annotations
 
-from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtCore import QEvent, QRectF, QSize, Qt
 from PySide6.QtGui import QFont, QFontMetricsF, QPainter, QPaintEvent
 from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
 
@@ -154,6 +154,43 @@ class PartlyBoldLabel(QWidget):
             paint.text_line(painter, rect, text, font, self._theme.colour("text"))
             rect.setLeft(rect.left() + paint.width_of(font, text))
         painter.end()
+
+
+class IconLabel(QLabel):
+    """Icon in the colour of a role, next to a text with the same meaning.
+
+    Args:
+        theme: Theme.
+        icon: Name of the icon.
+        role: Colour role.
+        side: Size in px.
+        scales: True to scale the icon with the text size.
+    """
+
+    def __init__(
+        self, theme: Theme, icon: str, role: str = "textSecondary", side: int = 16, *, scales: bool = True
+    ) -> None:
+        super().__init__()
+        self._theme, self._icon, self._role, self._side, self._scales = theme, icon, role, side, scales
+        self.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        theme.changed.connect(self._update_pixmap)
+        self._update_pixmap()
+
+    def set_icon(self, icon: str, role: str) -> None:
+        """Set the icon and the colour role."""
+        if (icon, role) != (self._icon, self._role):
+            self._icon, self._role = icon, role
+            self._update_pixmap()
+
+    def event(self, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.DevicePixelRatioChange:
+            self._update_pixmap()
+        return super().event(event)
+
+    def _update_pixmap(self) -> None:
+        side = round(self._theme.scaled(self._side)) if self._scales else self._side
+        icon = self._theme.icon(self._icon, self._role)
+        self.setPixmap(icon.pixmap(QSize(side, side), self.devicePixelRatioF()))
 
 
 class Separator(QWidget):

@@ -171,9 +171,13 @@ def show_when(widget: QWidget, visible: bool) -> None:
 
 
 def set_style_property(widget: QWidget, name: str, value: object) -> None:
-    """Set a dynamic property that the style sheet uses, and apply the style sheet again if it changed."""
+    """Set a dynamic property that the style sheet uses, and apply the style sheet again if it changed.
+
+    Widgets that were never shown get the style later.
+    """
     if widget.property(name) != value:
         widget.setProperty(name, value)
-        widget.style().unpolish(widget)
-        widget.style().polish(widget)
-        widget.update()
+        if widget.testAttribute(Qt.WidgetAttribute.WA_WState_Polished):
+            widget.style().unpolish(widget)
+            widget.style().polish(widget)
+            widget.update()

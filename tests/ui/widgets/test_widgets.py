@@ -167,8 +167,9 @@ def test_chip_without_text_is_hidden_and_chip_without_parent_opens_no_window(qtb
 
 def test_primary_button_is_filled_only_while_enabled(qtbot, theme: Theme) -> None:
     theme.apply()
-    primary = Button(theme, "Try", "play", kind="primary")
-    shown(qtbot, primary)
+    holder = QWidget()
+    primary = Button(theme, "Try", "play", kind="primary", parent=holder)
+    shown(qtbot, holder)
     assert theme.colour("accent").name() in colours(primary)
     primary.setEnabled(False)
     assert theme.colour("accent").name() not in colours(primary)

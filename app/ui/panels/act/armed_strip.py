@@ -38,6 +38,7 @@ class ArmedStrip(QWidget):
         super().__init__()
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self._context, self._theme = context, context.theme
+        self._is_on = False
         self._last_state: tuple[object, ...] = ()
         self.switch = Switch(self._theme, _("Armed"))
         self.switch.clicked.connect(self._toggle_armed)
@@ -92,6 +93,7 @@ class ArmedStrip(QWidget):
         if state == self._last_state:
             return
         self._last_state = state
+        self._is_on = arming.is_on
         paint.set_style_property(self, "armed", arming.is_on)
         self.switch.setChecked(arming.is_on)
         can_arm = self.is_for_replay or is_live

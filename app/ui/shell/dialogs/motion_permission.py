@@ -4,39 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtCore import QEvent, QObject, QRectF, Qt
-from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
+from PySide6.QtCore import QEvent, QObject, Qt
+from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication, QGraphicsDropShadowEffect, QHBoxLayout, QVBoxLayout, QWidget
 from shiboken6 import isValid
 
 from app.core.robots.motion.permission import MotionPermission
 from app.errors import SettingsError
 from app.ui.text import plain
-from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Button, Switch, label, paint
+from app.ui.widgets import Button, Switch, label
+from app.ui.widgets.labels import IconLabel
 from nep.i18n import _
 
 WIDTH = 480
 TOP_SHARE = 0.42  # below every Stop: those of the run bar and of the robots
-TILE_SIZE, MARGIN, BUTTON_GAP = 40, 20, 10
-
-
-class _Tile(QWidget):
-    """Icon of the card on a coloured background."""
-
-    def __init__(self, theme: Theme) -> None:
-        super().__init__()
-        self._theme = theme
-        self.setFixedSize(TILE_SIZE, TILE_SIZE)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        theme, painter = self._theme, QPainter(self)
-        rect = QRectF(self.rect())
-        paint.box(painter, rect, theme.radius("panel"), theme.colour("warnTint"), theme.colour("warnBorder"))
-        inset = TILE_SIZE * 0.24
-        paint_icon(painter, rect.adjusted(inset, inset, -inset, -inset), "footprints", theme.colour("warn"))
-        painter.end()
+TILE_SIZE, ICON_SIZE, MARGIN, BUTTON_GAP = 40, 20, 20, 10
 
 
 class MotionPermissionCard(QWidget):
@@ -87,7 +70,10 @@ class MotionPermissionCard(QWidget):
         text_column.addWidget(self.message)
         top = QHBoxLayout()
         top.setSpacing(14)
-        top.addWidget(_Tile(theme), 0, Qt.AlignmentFlag.AlignTop)
+        tile = IconLabel(theme, "footprints", "warn", ICON_SIZE, scales=False)
+        tile.setProperty("tile", "warn")
+        tile.setFixedSize(TILE_SIZE, TILE_SIZE)
+        top.addWidget(tile, 0, Qt.AlignmentFlag.AlignTop)
         top.addLayout(text_column, 1)
         footer = QHBoxLayout()
         footer.setSpacing(BUTTON_GAP)

@@ -9,8 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from PySide6.QtCore import QRectF, QSize, QStandardPaths, Qt, QTimer, QUrl
-from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtCore import QSize, QStandardPaths, Qt, QTimer, QUrl
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QScrollArea, QVBoxLayout, QWidget
 
 from app.core.reports.privacy import without_home
@@ -26,11 +25,11 @@ from app.core.reports.problem_report import (
 )
 from app.ui.other_programs import open_externally
 from app.ui.shell.dialogs.overlay import Overlay
-from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Switch, label, paint, set_role
 from app.ui.widgets.file_dialogs import FileDialogs, FileKind
 from app.ui.widgets.inputs.fields import LongTextField
+from app.ui.widgets.labels import IconLabel
 from nep.i18n import _, lazy
 
 WIDTH, SIDE_MARGIN, SCROLL_BAR_WIDTH = 620, 19, 10
@@ -253,14 +252,13 @@ class _PartRow(QWidget):
 
     def __init__(self, theme: Theme, text: str, icon: str) -> None:
         super().__init__()
-        self._theme, self._icon = theme, icon
+        icon_label = IconLabel(
+            theme, icon, "ok" if icon == "check" else "textTertiary", ICON_SIZE, scales=False
+        )
+        icon_label.setContentsMargins(0, 2, 0, 0)
         self.text_label: QLabel = label(text, "body", wrap=True)
         row = QHBoxLayout(self)
-        row.setContentsMargins(ICON_SIZE + 8, 0, 0, 0)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(8)
+        row.addWidget(icon_label, 0, Qt.AlignmentFlag.AlignTop)
         row.addWidget(self.text_label, 1)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        colour = self._theme.colour("ok" if self._icon == "check" else "textTertiary")
-        paint_icon(painter, QRectF(0, 2, ICON_SIZE, ICON_SIZE), self._icon, colour)
-        painter.end()

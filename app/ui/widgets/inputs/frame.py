@@ -23,7 +23,7 @@ class FieldFrame(QWidget):
     @property
     def is_invalid(self) -> bool:
         """True while the text is shown as invalid."""
-        return self.property("wrong") == "true"
+        return bool(self.property("wrong") == "true")
 
     def set_invalid(self, *, is_invalid: bool) -> None:
         """Show the text as invalid if `is_invalid`, else as valid."""

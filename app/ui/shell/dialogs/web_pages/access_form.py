@@ -9,10 +9,11 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
 
 from app.core.network.web_pages import WebPages
 from app.core.network.web_texts import address_text
-from app.ui.shell.dialogs.web_pages.fields import CopyField, RoleIcon
+from app.ui.shell.dialogs.web_pages.fields import CopyField
 from app.ui.shell.dialogs.web_pages.qr_code import SIDE, QrCode
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, ComboBox, IconButton, Segments, label, set_role
+from app.ui.widgets.labels import IconLabel
 from nep.i18n import _
 from nep.system.addresses import OwnAddress
 
@@ -100,7 +101,9 @@ class AccessForm(QWidget):
         self.token = CopyField(theme, _("Token"), _("Copy the token"), self.reveal)
         self.new_token = Button(theme, _("New"), "refresh-cw")
         self.address_choice = AddressChoice(theme)
-        self.reach_icon = RoleIcon(theme, "lock", side=14, is_at_top=True)
+        self.reach_icon = IconLabel(theme, "lock", side=14)
+        self.reach_icon.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
+        self.reach_icon.setContentsMargins(0, 2, 0, 2)
         self.reach = label("", "small", wrap=True)
         self.works_with = label("", "small", role="textTertiary", wrap=True)
         self.qr = QrCode(theme)
@@ -176,7 +179,7 @@ class AccessForm(QWidget):
     def _show_reach(self, *, is_foxglove: bool) -> None:
         host = self._web.host
         role = "warn" if host else "textSecondary"
-        self.reach_icon.set("wifi" if host else "lock", role)
+        self.reach_icon.set_icon("wifi" if host else "lock", role)
         set_role(self.reach, role)
         text = _("Other devices can't reach this address.")
         if host:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QRectF, QSize, Signal
-from PySide6.QtGui import QFocusEvent, QKeyEvent, QKeySequence, QPainter, QPaintEvent
-from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QWidget
+from PySide6.QtCore import QSize, Signal
+from PySide6.QtGui import QFocusEvent, QKeyEvent, QKeySequence
+from PySide6.QtWidgets import QHBoxLayout, QLineEdit
 
-from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import IconButton
 from app.ui.widgets.inputs.frame import FieldFrame
@@ -95,35 +94,3 @@ class CopyField(FieldFrame):
 
     def minimumSizeHint(self) -> QSize:
         return QSize(round(self._theme.scaled(140)), self.sizeHint().height())
-
-
-class RoleIcon(QWidget):
-    """Icon in the colour of a role, next to a text with the same meaning."""
-
-    def __init__(
-        self, theme: Theme, icon: str, role: str = "textSecondary", side: int = 16, *, is_at_top: bool = False
-    ) -> None:
-        # `is_at_top` aligns the icon with the first of several lines.
-        super().__init__()
-        self._is_at_top = is_at_top
-        self._theme, self._icon, self._role, self._side = theme, icon, role, side
-
-    def set(self, icon: str, role: str) -> None:
-        """Set the icon and the colour role."""
-        if (icon, role) != (self._icon, self._role):
-            self._icon, self._role = icon, role
-            self.update()
-
-    def sizeHint(self) -> QSize:
-        side = round(self._theme.scaled(self._side))
-        return QSize(side, side + 4)
-
-    def minimumSizeHint(self) -> QSize:
-        return self.sizeHint()
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        side, painter = self.sizeHint().width(), QPainter(self)
-        top = self._theme.scaled(2) if self._is_at_top else (self.height() - side) / 2
-        icon_area = QRectF(0, top, side, side)
-        paint_icon(painter, icon_area, self._icon, self._theme.colour(self._role))
-        painter.end()

@@ -9,12 +9,12 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWi
 
 from app.core.network.web_pages import WebPages
 from app.ui.shell.dialogs.web_pages.access_form import LABEL_WIDTH
-from app.ui.shell.dialogs.web_pages.fields import RoleIcon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, label, set_role
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.inputs.check_box import CheckBox
 from app.ui.widgets.inputs.token_field import Token, TokenField
+from app.ui.widgets.labels import IconLabel
 from nep.errors import NepError
 from nep.i18n import _, format_list
 
@@ -80,7 +80,7 @@ class RobotChoice(QWidget):
         super().__init__()
         self._theme, self._web, self._robots = theme, web, robots
         self.text_label = label("", "body", wrap=True)
-        self.icon = RoleIcon(theme, "bot")
+        self.icon = IconLabel(theme, "bot")
         self.choose = Button(theme, _("Choose robots"), size="small")
         self.choose.setCheckable(True)
         self.no_robots_label = label(_("No robots are connected."), "small", role="textTertiary", wrap=True)
@@ -119,7 +119,7 @@ class RobotChoice(QWidget):
             self.text_label.setText(text)
         role = "warn" if names else "text"
         set_role(self.text_label, role)
-        self.icon.set("triangle-alert" if names else "bot", role if names else "textSecondary")
+        self.icon.set_icon("triangle-alert" if names else "bot", role if names else "textSecondary")
         if self.choose.isChecked():
             self._show_boxes()
 

@@ -16,7 +16,6 @@ from app.ui.other_programs import open_externally
 from app.ui.panels.base import ShowToast
 from app.ui.shell.dialogs.overlay import STOP_GAP, Overlay, stop_buttons_in
 from app.ui.shell.dialogs.web_pages.access_form import AccessForm
-from app.ui.shell.dialogs.web_pages.fields import RoleIcon
 from app.ui.shell.dialogs.web_pages.notice_strip import NoticeStrip
 from app.ui.shell.dialogs.web_pages.page_model import PageTreeModel, sorted_topics
 from app.ui.shell.dialogs.web_pages.page_tree import PageTree
@@ -37,6 +36,7 @@ from app.ui.widgets import (
 )
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.keyboard import tab_stops_of
+from app.ui.widgets.labels import IconLabel
 from nep.i18n import _, ngettext
 
 WIDTH = 640
@@ -140,7 +140,7 @@ class WebPagesSheet(Overlay):
     def _header_row(self) -> QHBoxLayout:
         title = QWidget()
         row = Flow(title, gap=10)
-        row.addWidget(RoleIcon(self.theme, "globe", side=20))
+        row.addWidget(IconLabel(self.theme, "globe", side=20))
         row.addWidget(label(_("Web pages and tablets"), "heading", wrap=True))
         row.addWidget(self.count)
         header = self.create_header(title)
