@@ -12,7 +12,7 @@ from collections.abc import Callable
 from functools import lru_cache
 
 from PySide6.QtCore import QByteArray, QPointF, QRect, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QGuiApplication, QIcon, QIconEngine, QPainter, QPixmap
+from PySide6.QtGui import QColor, QIcon, QIconEngine, QPainter, QPixmap
 from PySide6.QtSvg import QSvgRenderer
 
 from app import resources
@@ -102,23 +102,23 @@ def _cached_pixmap(
     ratio: float,
     *,
     is_filled: bool = False,
-    is_trailing: bool = False,
+    is_right: bool = False,
 ) -> QPixmap:
     pixmap = QPixmap(round(width * ratio), round(height * ratio))
     pixmap.setDevicePixelRatio(ratio)
     pixmap.fill(Qt.GlobalColor.transparent)
     painter = QPainter(pixmap)
-    icon_rect = _square_in(QRectF(0, 0, width, height), is_trailing)
+    icon_rect = _square_in(QRectF(0, 0, width, height), is_right)
     paint_icon(painter, icon_rect, name, QColor.fromRgba(rgba), is_filled=is_filled)
     painter.end()
     return pixmap
 
 
-def _square_in(rect: QRectF, is_trailing: bool) -> QRectF:
+def _square_in(rect: QRectF, is_right: bool) -> QRectF:
     # A wider rectangle has space for the gap between the icon and a text.
     side = min(rect.width(), rect.height())
     square = QRectF(rect.left(), rect.center().y() - side / 2, side, side)
-    if is_trailing != QGuiApplication.isRightToLeft():
+    if is_right:
         square.moveRight(rect.right())
     return square
 
@@ -137,7 +137,7 @@ def paint_cached_icon(painter: QPainter, rect: QRectF, name: str, colour: QColor
 class IconEngine(QIconEngine):
     """Icon engine that paints an icon in the colour of the current mode, such as normal or disabled.
 
-    In a size that is wider than high, the icon is at the leading or trailing edge.
+    In a size that is wider than high, the icon is on the left or on the right.
     """
 
     def __init__(
@@ -146,17 +146,17 @@ class IconEngine(QIconEngine):
         colour: Callable[[QIcon.Mode, QIcon.State], QColor],
         *,
         is_filled: bool = False,
-        is_trailing: bool = False,
+        is_right: bool = False,
     ) -> None:
         # `colour` is called at each paint, so that a new theme needs no new icon.
         super().__init__()
         _source(name)
         self._name = name
         self._colour = colour
-        self._is_filled, self._is_trailing = is_filled, is_trailing
+        self._is_filled, self._is_right = is_filled, is_right
 
     def paint(self, painter: QPainter, rect: QRect, mode: QIcon.Mode, state: QIcon.State) -> None:
-        icon_rect, colour = _square_in(QRectF(rect), self._is_trailing), self._colour(mode, state)
+        icon_rect, colour = _square_in(QRectF(rect), self._is_right), self._colour(mode, state)
         paint_icon(painter, icon_rect, self._name, colour, is_filled=self._is_filled)
 
     def pixmap(self, size: QSize, mode: QIcon.Mode, state: QIcon.State) -> QPixmap:
@@ -165,11 +165,11 @@ class IconEngine(QIconEngine):
     def scaledPixmap(self, size: QSize, mode: QIcon.Mode, state: QIcon.State, scale: float) -> QPixmap:
         width, height, rgba = size.width(), size.height(), self._colour(mode, state).rgba()
         return _cached_pixmap(
-            self._name, width, height, rgba, scale, is_filled=self._is_filled, is_trailing=self._is_trailing
+            self._name, width, height, rgba, scale, is_filled=self._is_filled, is_right=self._is_right
         )
 
     def key(self) -> str:
         return f"nep:{self._name}"
 
     def clone(self) -> QIconEngine:
-        return IconEngine(self._name, self._colour, is_filled=self._is_filled, is_trailing=self._is_trailing)
+        return IconEngine(self._name, self._colour, is_filled=self._is_filled, is_right=self._is_right)

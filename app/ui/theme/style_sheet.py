@@ -238,10 +238,8 @@ def _button_rules(theme: ThemeValues) -> str:
         )
         if colours.hovered != colours.fill:
             rules.append(f"{selector}:hover {{ {background(colours.hovered)} }}")
-        if colours.pressed != colours.hovered:
+        if colours.pressed != colours.fill:
             rules.append(f"{selector}:pressed, {selector}:checked {{ {background(colours.pressed)} }}")
-        elif colours.pressed != colours.fill:
-            rules.append(f"{selector}:checked {{ {background(colours.pressed)} }}")
         is_flat = colours.border is None and colours.fill is None
         border = "" if is_flat else f" border: 1px solid {theme.hex('border')};"
         rules.append(

@@ -340,7 +340,7 @@ class Theme(QObject):
         *,
         active_role: str = "text",
         is_filled: bool = False,
-        is_trailing: bool = False,
+        is_right: bool = False,
     ) -> QIcon:
         """Return an icon that follows changes of the theme.
 
@@ -349,9 +349,9 @@ class Theme(QObject):
             role: Colour role.
             active_role: Colour role while the icon is active, for example hovered.
             is_filled: True to fill the shape with the colour.
-            is_trailing: True for the trailing edge of a size that is wider than high.
+            is_right: True to paint the icon on the right in a size that is wider than high.
         """
-        key = (name, role, active_role, is_filled, is_trailing)
+        key = (name, role, active_role, is_filled, is_right)
         if key not in self._icons:
 
             def colour(mode: QIcon.Mode, _state: QIcon.State) -> QColor:
@@ -359,7 +359,7 @@ class Theme(QObject):
                     return self.colour("textDisabled")
                 return self.colour(active_role if mode == QIcon.Mode.Active else role)
 
-            self._icons[key] = QIcon(IconEngine(name, colour, is_filled=is_filled, is_trailing=is_trailing))
+            self._icons[key] = QIcon(IconEngine(name, colour, is_filled=is_filled, is_right=is_right))
         return self._icons[key]
 
     # -- block editor -----------------------------------------------------------------------------

@@ -53,7 +53,7 @@ _METRICS: dict[str, _ButtonMetrics] = {
     "normal": _ButtonMetrics(32, "body", 16, 8, 12, "control"),
     "form": _ButtonMetrics(36, "label", 16, 8, 14, "control"),
     "large": _ButtonMetrics(44, "button", 20, 10, 18, "large"),
-    "link": _ButtonMetrics(24, "title", 16, 6, 1, "small"),
+    "link": _ButtonMetrics(24, "title", 16, 6, 0, "small"),
     "smallSegment": _ButtonMetrics(24, "body", 16, 8, 10, "small"),
     "segment": _ButtonMetrics(28, "body", 16, 8, 14, "small"),
     "formSegment": _ButtonMetrics(32, "label", 16, 8, 14, "small"),
@@ -317,7 +317,11 @@ class Button(QPushButton):
         if icon is not None:
             role, is_filled = self.icon_colour_role(), self.has_filled_icon and self.isEnabled()
             option.icon = self._theme.icon(
-                icon, role, active_role=role, is_filled=is_filled, is_trailing=self.kind == "link"
+                icon,
+                role,
+                active_role=role,
+                is_filled=is_filled,
+                is_right=self.isRightToLeft() != (self.kind == "link"),
             )
             option.iconSize = QSize(icon_width - (QT_ICON_GAP if text else 0), self.icon_side())
 
@@ -332,7 +336,10 @@ class MenuButton(Button):
         super().paintEvent(event)
         painter, side = QPainter(self), self._theme.scaled(CHEVRON)
         icon_rect = QRectF(0, (self.height() - side) / 2, side, side)
-        icon_rect.moveRight(self.width() - CHEVRON_GAP)
+        if self.isRightToLeft():
+            icon_rect.moveLeft(CHEVRON_GAP)
+        else:
+            icon_rect.moveRight(self.width() - CHEVRON_GAP)
         role = BUTTON_COLOURS[self.kind].text if self.isEnabled() else "textDisabled"
         paint_icon(painter, icon_rect, "chevron-down", self._theme.colour(role))
         painter.end()
@@ -370,10 +377,8 @@ class LinkButton(Button):
 
     def initStyleOption(self, option: QStyleOptionButton) -> None:
         super().initStyleOption(option)
-        is_mirrored = self.layoutDirection() == Qt.LayoutDirection.RightToLeft
-        option.direction = (  # the icon is after the text
-            Qt.LayoutDirection.LeftToRight if is_mirrored else Qt.LayoutDirection.RightToLeft
-        )
+        directions = Qt.LayoutDirection
+        option.direction = directions.LeftToRight if self.isRightToLeft() else directions.RightToLeft
 
 
 class IconButton(QToolButton):
