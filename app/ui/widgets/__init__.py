@@ -1,4 +1,4 @@
-"""Painted widgets that panels and the shell share. Each takes the theme as its first argument.
+"""Widgets that panels and the shell share. The style sheet paints what consists of boxes, texts and icons.
 
 The widgets are independent of the session and of panels. Buttons, chips and labels are exported by this
 package, other widgets by their modules.

@@ -1,4 +1,4 @@
-"""Tests of the custom-painted widgets: appearance and keyboard control."""
+"""Tests of shared widgets: appearance and keyboard control."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ import pytest
 from PySide6.QtCore import QPoint, QPointF, QRect, QRectF, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QWheelEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QComboBox, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QComboBox, QLabel, QStyleOptionButton, QVBoxLayout, QWidget
 
+from app.ui.theme.style_sheet import BUTTON_COLOURS
 from app.ui.theme.theme import Theme
 from app.ui.widgets import (
     Button,
@@ -28,9 +29,12 @@ from app.ui.widgets import (
     ValueBar,
     paint,
 )
+from app.ui.widgets.buttons import Kind
 from app.ui.widgets.indicators import paint_sparkline
+from app.ui.widgets.inputs.fields import LongTextField
 from app.ui.widgets.inputs.slider import decimals_of
 from app.ui.widgets.keyboard import tab_stops_of
+from app.ui.widgets.labels import IconLabel
 from app.ui.widgets.lists.scroll_areas import ContentScrollArea, ScrollColumn
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
@@ -410,3 +414,80 @@ def test_steady_label_changes_its_size_hint_only_for_wider_or_empty_text(qtbot) 
     label.setText("")
     assert label.sizeHint().width() < 10
     assert label.text() == ""
+
+
+def test_button_shows_ampersands_and_elides_text_that_does_not_fit(theme: Theme) -> None:
+    button, option = Button(theme, "Salt & pepper"), QStyleOptionButton()
+    button.resize(button.sizeHint())
+    button.initStyleOption(option)
+    assert option.text == "Salt && pepper"
+    button.resize(60, button.height())
+    button.initStyleOption(option)
+    assert option.text.endswith("…")
+    assert button.text() == "Salt & pepper"
+
+
+@pytest.mark.parametrize("kind", ["plain", "ghost", "primary", "run", "stop"])
+def test_button_shows_that_it_is_pressed(qtbot, theme: Theme, kind: Kind) -> None:
+    theme.apply()
+    holder = QWidget()
+    button = Button(theme, "Try", kind=kind, parent=holder)
+    shown(qtbot, holder)
+    pressed = theme.colour(BUTTON_COLOURS[kind].pressed or "").name()
+    assert pressed not in colours(button)
+    button.setDown(True)
+    assert pressed in colours(button)
+
+
+def test_icon_of_a_button_is_mirrored_in_a_right_to_left_layout(qtbot, theme: Theme) -> None:
+    theme.apply()
+    holder = QWidget()
+    button = IconTextButton(theme, holder)
+    shown(qtbot, holder)
+    assert button.icon_is_left()
+    holder.setLayoutDirection(Qt.LayoutDirection.RightToLeft)
+    assert not button.icon_is_left()
+
+
+class IconTextButton(Button):
+    """Button whose icon has a colour of its own."""
+
+    def __init__(self, theme: Theme, parent: QWidget) -> None:
+        super().__init__(theme, "Try", "play", parent=parent)
+        self.icon_role = "error"
+
+    def icon_is_left(self) -> bool:
+        image, red = self.grab().toImage(), self._theme.colour("error").name()
+        columns = [
+            x
+            for x in range(image.width())
+            for y in range(image.height())
+            if image.pixelColor(x, y).name() == red
+        ]
+        return sum(columns) / len(columns) < image.width() / 2
+
+
+def test_frame_of_a_field_shows_focus_and_invalid_text(qtbot, theme: Theme) -> None:
+    theme.apply()
+    holder = QWidget()
+    field = LongTextField(theme, "Text")
+    QVBoxLayout(holder).addWidget(field)
+    shown(qtbot, holder)
+    accent, error = theme.colour("accent").name(), theme.colour("error").name()
+    assert accent not in colours(field)
+    holder.activateWindow()
+    field.setFocus()
+    qtbot.waitUntil(lambda: accent in colours(field))
+    field.set_invalid(is_invalid=True)
+    assert field.is_invalid
+    assert error in colours(field)
+
+
+def test_icon_label_follows_the_theme(qtbot, theme: Theme) -> None:
+    icon = IconLabel(theme, "check", "text")
+    qtbot.addWidget(icon)
+    before = icon.pixmap().toImage()
+    theme.set_mode("dark")
+    assert icon.pixmap().toImage() != before
+    theme.set_text_percent(200)
+    assert icon.pixmap().width() == 32 * icon.devicePixelRatioF()
