@@ -93,7 +93,7 @@ def paint_icon(
     painter.restore()
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=512)
 def _cached_pixmap(
     name: str,
     width: float,
