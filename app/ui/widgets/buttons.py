@@ -308,6 +308,8 @@ class Button(QPushButton):
 
     def initStyleOption(self, option: QStyleOptionButton) -> None:
         super().initStyleOption(option)
+        if not self.isVisible():  # Qt only needs the margins
+            return
         text = self.displayed_text()
         icon_width, padding = self._icon_width(text), min(_MIN_PADDING, self.metrics.padding)
         space = self.width() - 2 * padding - icon_width - self._indicator_width()

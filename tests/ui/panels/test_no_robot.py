@@ -44,7 +44,7 @@ def test_camera_does_not_offer_a_robot_that_is_already_starting(qtbot) -> None:
     def words() -> list[str]:
         made.refresh()
         said = [*made.empty.findChildren(QLabel), *made.empty.findChildren(Button)]
-        return [each.text() for each in said if not each.isHidden()]
+        return [each.text() for each in said if each.text() and not each.isHidden()]
 
     before = words()
     assert "Use the virtual robot" in before

@@ -416,8 +416,9 @@ def test_steady_label_changes_its_size_hint_only_for_wider_or_empty_text(qtbot) 
     assert label.text() == ""
 
 
-def test_button_shows_ampersands_and_elides_text_that_does_not_fit(theme: Theme) -> None:
+def test_button_shows_ampersands_and_elides_text_that_does_not_fit(qtbot, theme: Theme) -> None:
     button, option = Button(theme, "Salt & pepper"), QStyleOptionButton()
+    shown(qtbot, button)
     button.resize(button.sizeHint())
     button.initStyleOption(option)
     assert option.text == "Salt && pepper"

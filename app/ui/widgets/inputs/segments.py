@@ -18,6 +18,7 @@ from app.ui.widgets.flow_layout import Flow
 from nep.i18n import _
 
 DOT_OVERLAP = -4  # px
+MIN_WIDTH = 40  # px; a narrower segment has no space for three letters
 _SIZES: dict[str, Size] = {"small": "smallSegment", "normal": "segment", "form": "formSegment"}
 
 
@@ -26,6 +27,7 @@ class _Segment(Button):
         self._has_check_mark = check
         self._is_icon_only = self._is_dot_visible = self.reserves_dot = False
         super().__init__(theme, label, icon, kind="segment", size=_SIZES[size])
+        self._min_width = MIN_WIDTH
         self.setCheckable(True)
         self.setAutoExclusive(True)
 
