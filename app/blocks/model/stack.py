@@ -37,20 +37,6 @@ class Stack:
         """True if the stack is a value block."""
         return self.kind == "value"
 
-    @classmethod
-    def from_json(cls, request: object) -> Stack:
-        """Parse a request of the editor's page.
-
-        An invalid request results in a stack whose block doesn't exist.
-        """
-        request_fields: SavedJson = request if isinstance(request, Mapping) else {}
-        state = request_fields.get("state")
-        return cls(
-            str(request_fields.get("id")),
-            str(request_fields.get("kind")),
-            state if isinstance(state, Mapping) else None,
-        )
-
     def workspace(self, behaviour: SavedJson) -> dict[str, object] | None:
         """Return a workspace with only this stack, below a start block, and the functions of the behaviour.
 

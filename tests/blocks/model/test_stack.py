@@ -13,7 +13,7 @@ from app.blocks.compiler.compiler import compile_behaviour
 from app.blocks.model.program import Program
 from app.blocks.model.stack import SHOW_BLOCK_ID, Stack
 from tests.blocks.fakes import play
-from tests.blocks.samples import block, call, define, get, number, robot, say, stack, started, text, workspace
+from tests.blocks.samples import block, call, define, get, number, robot, say, stack, started, workspace
 
 BATTERY = block("robot_pepper_get_battery", "bat", ROBOT="Pepper")
 
@@ -79,9 +79,3 @@ def test_trial_of_value_block_prints_its_value() -> None:
 def test_trial_of_deleted_block_has_no_program() -> None:
     assert Stack("nowhere").workspace(behaviour()) is None
     assert Stack("nowhere").workspace({}) is None
-
-
-def test_stack_is_parsed_from_editor_json() -> None:
-    assert Stack.from_json({"id": "a", "kind": "value"}) == Stack("a", "value")
-    assert Stack.from_json({"id": "a", "kind": "stack", "state": text("x")}).state is not None
-    assert Stack.from_json("nonsense").workspace(behaviour()) is None

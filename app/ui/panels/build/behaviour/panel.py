@@ -310,13 +310,21 @@ class BehaviourPanel(PanelWidget):
                 editor.setFocus(Qt.FocusReason.OtherFocusReason)
         return editor
 
-    def _run_page_command(self, command: str) -> None:
-        # The page sends ids of commands, and intents for variables as "name:id".
-        name, _colon, id = command.partition(":")
-        if name in PAGE_INTENTS:
-            self.context.request(PAGE_INTENTS[name](id))
-        else:
-            self.context.run(command)
+    def _run_for_page(self, message: CommandRequested | CanvasButtonPressed | StackTried) -> None:
+        match message:
+            case CommandRequested():
+                # The page sends ids of commands, and intents for variables as "name:id".
+                name, _colon, id = message.command.partition(":")
+                if name in PAGE_INTENTS:
+                    self.context.request(PAGE_INTENTS[name](id))
+                else:
+                    self.context.run(message.command)
+            case CanvasButtonPressed():
+                self.context.run(START_COMMANDS[message.button])
+            case StackTried():
+                self.context.request(TryStack(Stack(message.id, message.kind, message.state)))
+            case _:
+                reject_unhandled(message)
 
     def _show_missing_libraries(self, missing: MissingLibraries) -> None:
         alert_missing(self.session.alerts, missing)
@@ -363,12 +371,8 @@ class BehaviourPanel(PanelWidget):
                 self._show_live_values()
             case VariablesWatched():
                 self._watched_variable_ids = message.ids
-            case CommandRequested():
-                self._run_page_command(message.command)
-            case CanvasButtonPressed():
-                self.context.run(START_COMMANDS[message.button])
-            case StackTried():
-                self.context.request(TryStack(Stack(message.id, message.kind, message.state)))
+            case CommandRequested() | CanvasButtonPressed() | StackTried():
+                self._run_for_page(message)
             case BackpackOpened() | BackpackAdded() | BackpackRemoved() | BackpackEmptied():
                 backpack.handle(message)
             case BlocksDraggedOutside() | DragImageRendered() | BlocksDroppedOutside() | BlocksTransferred():

@@ -10,6 +10,7 @@ from PySide6.QtGui import QGuiApplication, QImage
 from app.core.projects.open_project import OpenProject
 from app.core.storage.atomic_file import write_atomically
 from app.core.storage.folders import closed_tabs_folder
+from app.ui.blockly.messages import PictureKind
 from app.ui.panels.base import PanelContext
 from app.ui.widgets.file_dialogs import FileKind
 from nep.i18n import _, lazy
@@ -46,7 +47,7 @@ class ImageCommands:
     """
 
     def __init__(
-        self, context: PanelContext, render: Callable[[str, bool, Callable[[bytes], None]], object]
+        self, context: PanelContext, render: Callable[[PictureKind, bool, Callable[[bytes], None]], object]
     ) -> None:
         self._context, self._render = context, render
 
@@ -55,11 +56,11 @@ class ImageCommands:
         suggestion = suggested_path(self._context.session.document)
 
         def save_image(path: Path, kind: FileKind) -> None:
-            self.save(path, kind.suffix.lstrip("."), kind in OPAQUE_IMAGE_KINDS)
+            self.save(path, "svg" if kind.suffix == ".svg" else "png", kind in OPAQUE_IMAGE_KINDS)
 
         self._context.files.save_as(_("Save blocks as image"), suggestion, IMAGE_KINDS, save_image)
 
-    def save(self, path: Path, kind: str, white: bool) -> None:
+    def save(self, path: Path, kind: PictureKind, white: bool) -> None:
         """Save an image of the blocks, adding the file extension if it is missing.
 
         Args:
