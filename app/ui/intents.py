@@ -149,14 +149,14 @@ class RemoveVirtualRobot(Intent):
 
 
 @dataclass(frozen=True)
-class ShowTab(Intent):
+class SelectTab(Intent):
     """Show a tab."""
 
     key: str
 
 
 @dataclass(frozen=True)
-class CloseTab(Intent):
+class CloseBehaviour(Intent):
     """Close a tab."""
 
     key: str

@@ -40,6 +40,7 @@ NEUTRAL_RESULTS: dict[str, Callable[[], object]] = {
     "loadResource": RETURN_NONE,
     # delegates and views
     "paint": RETURN_NONE,
+    "initStyleOption": RETURN_NONE,
     "pixmap": QPixmap,
     "scaledPixmap": QPixmap,
     "paintSection": RETURN_NONE,

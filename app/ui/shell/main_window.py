@@ -17,7 +17,7 @@ from app.core.projects.titles import recent_titles
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.core.session import Session
 from app.intents import Intent
-from app.ui.intents import BlockEdit, EditBlocks, PlotField, ShowTab
+from app.ui.intents import BlockEdit, EditBlocks, PlotField, SelectTab
 from app.ui.panels.base import Diagnose, Panel, PanelContext, ShowToast
 from app.ui.shell.actions.shortcuts import format_key
 from app.ui.shell.bars.app_bar import AppBar, robots_chip
@@ -253,7 +253,7 @@ class MainWindow(QMainWindow):
         return "behaviour" if any(not each.is_blank for each in self.session.documents) else ""
 
     def _continue_work(self, key: str) -> None:
-        self.request(ShowTab(key))
+        self.request(SelectTab(key))
         self._run_command("layout.behaviour")
 
     def show_examples(self) -> None:

@@ -21,7 +21,7 @@ from app.ui.blockly.messages import (
     PanelMessage,
     SensorsShown,
 )
-from app.ui.intents import PressKey, ShowTab
+from app.ui.intents import PressKey, SelectTab
 from app.ui.panels.base import Panel
 from app.ui.panels.build.behaviour.dragged_blocks import POINTER_OFFSET, DragImage, transfer_text
 from app.ui.panels.build.behaviour.panel import BehaviourPanel
@@ -420,7 +420,7 @@ def test_tab_under_a_dragged_block_opens_and_the_drag_image_follows(qtbot, panel
     assert shown.isVisible()
     assert (shown.width(), shown.height()) == (30, 20)
     assert shown.pos() == title.window().mapFromGlobal(place) + POINTER_OFFSET
-    qtbot.waitUntil(lambda: window.commands == [ShowTab(other.key)])
+    qtbot.waitUntil(lambda: window.commands == [SelectTab(other.key)])
     send(panel, BlocksDraggedOutside(None, home.key))
     assert not shown.isVisible()
     send(panel, DragImageRendered(bytes(data.data()), 2.0))

@@ -8,7 +8,7 @@ from PySide6.QtGui import QContextMenuEvent, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QToolTip
 
-from app.ui.intents import CloseTab, DuplicateTab
+from app.ui.intents import CloseBehaviour, DuplicateTab
 from app.ui.panels.build.behaviour.tab import TabState
 from app.ui.panels.build.behaviour.tabs import NEW_TAB, BehaviourTabs
 from app.ui.theme.theme import Theme
@@ -187,7 +187,7 @@ def test_tab_menu_lists_the_available_commands(qtbot, tabs) -> None:
     for each in ("Duplicate", "Close"):
         by_words[each].trigger()
     menu.close()
-    assert asked == [(DuplicateTab("b"),), (CloseTab("b"),)]
+    assert asked == [(DuplicateTab("b"),), (CloseBehaviour("b"),)]
 
 
 # -- renaming -------------------------------------------------------------------------------------

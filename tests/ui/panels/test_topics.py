@@ -6,6 +6,7 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QSignalSpy, QTest
 
 from app.core.network.master import MasterState
+from app.ui.intents import NewAlarm, PublishMessage, RecordTopic
 from app.ui.panels.watch.topics.columns import (
     age_cell,
     bandwidth_cell,
@@ -18,6 +19,7 @@ from app.ui.panels.watch.topics.columns import (
 from app.ui.panels.watch.topics.panel import PANEL, TopicsPanel
 from app.ui.widgets import Button
 from app.ui.widgets.table.model import CELL_ROLE
+from nep.programs.alarms import AlarmCondition
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, button, press, ticks
 from tests.ui.sample_data import Topic
@@ -303,8 +305,9 @@ def test_context_menu_of_a_topic_offers_all_its_commands(panel, window) -> None:
     assert window.opened == ["/blackboard"]
     assert window.beside == ["/blackboard"]
     assert window.plotted == [("/blackboard", "")]
-    about = ("publish.topic", "alarm.topic", "record.topic")
-    assert window.commands == [f"{command}:/blackboard" for command in about]
+    condition = AlarmCondition("silent", "/blackboard", for_s=2.0)
+    requested = [PublishMessage("/blackboard"), NewAlarm(condition), RecordTopic("/blackboard")]
+    assert window.commands == requested
     assert QGuiApplication.clipboard().text() == "/blackboard"
 
 

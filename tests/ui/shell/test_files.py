@@ -12,7 +12,7 @@ from app.core.projects.open_project import OpenProject
 from app.core.projects.versions import free_path
 from app.core.run.view import RunState
 from app.intents import AddTimeLimit, OpenBehaviour
-from app.ui.intents import CloseOtherTabs, CloseTab, MoveTab
+from app.ui.intents import CloseBehaviour, CloseOtherTabs, MoveTab
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.main_window import MainWindow
 from tests.ui.shell_parts import Answers
@@ -301,7 +301,7 @@ def test_tabs_are_selected_moved_and_closed_by_commands(commands, window, tmp_pa
     assert names(window) == ["C", "A", "B"]
     commands.request(CloseOtherTabs(key))
     assert names(window) == ["C"]
-    commands.request(CloseTab("nobody"))
+    commands.request(CloseBehaviour("nobody"))
     assert names(window) == ["C"]
 
 

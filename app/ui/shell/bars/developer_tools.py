@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, QObject, QSize
+from PySide6.QtCore import QEvent, QObject, QSize, Qt
 from PySide6.QtWidgets import QWidget
 
 from app.core.recording.recordings import SessionRecordings
@@ -113,6 +113,7 @@ class SourceSwitch(MenuButton):
 
     def _open_menu(self) -> None:
         menu = Menu(self._theme, self)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.addActions([self._actions["replay.open"], self._actions["replay.live"]])
         open_below(menu, self)
 

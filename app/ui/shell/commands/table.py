@@ -30,8 +30,8 @@ from app.intents import (
 )
 from app.robots.virtual_models import VirtualModel, virtual_models
 from app.ui.intents import (
+    CloseBehaviour,
     CloseOtherTabs,
-    CloseTab,
     DuplicateTab,
     ExportRecording,
     MenuEdit,
@@ -46,7 +46,7 @@ from app.ui.intents import (
     RenameTab,
     SaveTab,
     SaveTabAs,
-    ShowTab,
+    SelectTab,
     ShowTabFolder,
     TryStack,
     Undo,
@@ -418,8 +418,8 @@ INTENTS: tuple[IntentHandler[Handlers, Any], ...] = (
     IntentHandler(PressKey, lambda do, intent: do.view.run_shortcut(intent.key)),
     IntentHandler(PointAtButton, lambda do, intent: do.view.point_at(intent.command)),
     IntentHandler(TryStack, lambda do, intent: do.behaviours.try_stack(intent.stack)),
-    IntentHandler(ShowTab, lambda do, intent: do.behaviours.show_tab(intent.key)),
-    IntentHandler(CloseTab, lambda do, intent: do.behaviours.close_tab(intent.key)),
+    IntentHandler(SelectTab, lambda do, intent: do.behaviours.show_tab(intent.key)),
+    IntentHandler(CloseBehaviour, lambda do, intent: do.behaviours.close_tab(intent.key)),
     IntentHandler(CloseOtherTabs, lambda do, intent: do.behaviours.close_other_tabs(intent.key)),
     IntentHandler(SaveTab, lambda do, intent: do.behaviours.save_tab(intent.key)),
     IntentHandler(SaveTabAs, lambda do, intent: do.behaviours.save_tab_as(intent.key)),

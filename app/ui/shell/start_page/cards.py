@@ -23,6 +23,7 @@ from nep.i18n import _
 EXAMPLE_ART_HEIGHT = 112
 RECENT_HEIGHT = 48
 TILE_SIZE = 30
+TERMINAL_COMMAND = "nep topic list"
 
 
 class CardTitle(QLabel):
@@ -174,7 +175,7 @@ class DevelopersLine(QWidget):
         row.addWidget(question)
         row.addWidget(link)
         row.addWidget(label(_("or type"), "body", role="textSecondary"))
-        command = label("nep topic list", "code", role="textSecondary")
+        command = label(TERMINAL_COMMAND, "code", role="textSecondary")
         command.setProperty("keyCap", "true")
         row.addWidget(command)
         row.addStretch(1)

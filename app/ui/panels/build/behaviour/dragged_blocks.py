@@ -19,7 +19,7 @@ from app.ui.blockly.messages import (
     PagePosition,
     reject_unhandled,
 )
-from app.ui.intents import ShowTab
+from app.ui.intents import SelectTab
 from app.ui.panels.base import PanelContext
 from app.ui.panels.build.behaviour.tabs import NEW_TAB, BehaviourTabs
 from nep.i18n import _, ngettext
@@ -180,7 +180,7 @@ class BlockDrag:
 
     def _open_target(self) -> None:
         if self._drag_position is not None and self._hovered_target not in {"", NEW_TAB}:
-            self._context.request(ShowTab(self._hovered_target))
+            self._context.request(SelectTab(self._hovered_target))
             self._show()
 
     def _move_image(self, position: QPoint | None) -> None:
@@ -201,7 +201,7 @@ class BlockDrag:
         if not target:
             return
         if target != NEW_TAB:
-            self._context.request(ShowTab(target))
+            self._context.request(SelectTab(target))
             self._transfer()
             return
         self._context.run("file.new")
@@ -217,7 +217,7 @@ class BlockDrag:
         message = transfer_text(count, how, self._session.documents.title(document))
 
         def undo() -> None:
-            self._context.request(ShowTab(home))
+            self._context.request(SelectTab(home))
             self._editor.undo_block_move()
 
         self._context.show_toast(message, _("Undo"), undo)

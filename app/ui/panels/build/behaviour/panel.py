@@ -42,13 +42,13 @@ from app.ui.blockly.messages import (
 )
 from app.ui.intents import (
     BlockEdit,
-    CloseTab,
+    CloseBehaviour,
     DeleteVariable,
     MenuEdit,
     MoveTab,
     PressKey,
     RenameTab,
-    ShowTab,
+    SelectTab,
     ToggleVariableWatch,
     TryStack,
 )
@@ -172,8 +172,8 @@ class BehaviourPanel(PanelWidget):
         self._bar.undo.clicked.connect(self.undo)
         self._bar.redo.clicked.connect(self.redo)
         tabs = self._bar.tabs
-        tabs.selected.connect(lambda key: context.request(ShowTab(key)))
-        tabs.close_requested.connect(lambda key: context.request(CloseTab(key)))
+        tabs.selected.connect(lambda key: context.request(SelectTab(key)))
+        tabs.close_requested.connect(lambda key: context.request(CloseBehaviour(key)))
         tabs.moved.connect(lambda key, place: context.request(MoveTab(key, place)))
         tabs.intent_requested.connect(context.request)
         tabs.renamed.connect(lambda key, name: context.request(RenameTab(key, name)))

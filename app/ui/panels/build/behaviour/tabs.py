@@ -9,7 +9,7 @@ from PySide6.QtGui import QContextMenuEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
 from app.intents import Intent
-from app.ui.intents import CloseOtherTabs, CloseTab, DuplicateTab, SaveTab, SaveTabAs, ShowTabFolder
+from app.ui.intents import CloseBehaviour, CloseOtherTabs, DuplicateTab, SaveTab, SaveTabAs, ShowTabFolder
 from app.ui.panels.build.behaviour.tab import BehaviourTab, NameField, TabState
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
@@ -296,7 +296,7 @@ class BehaviourTabs(QWidget):
             (_("Save as"), "", SaveTabAs),
             (_("Show in folder"), "folder-open", ShowTabFolder),
             ("", "", None),
-            (_("Close"), "x", CloseTab),
+            (_("Close"), "x", CloseBehaviour),
             (_("Close other behaviours"), "", CloseOtherTabs),
         )
         for text, icon, make in entries:
