@@ -26,7 +26,7 @@ class VirtualModel:
     Attributes:
         model: Id of the model, as in its description.
         name: Default name of a robot.
-        module: Name of the module that is run in a process of its own.
+        module: Name of the module, which runs in a separate process.
     """
 
     model: str

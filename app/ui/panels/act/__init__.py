@@ -1,1 +1,1 @@
-"""Panels to publish messages and to call services, with the log of what was sent."""
+"""Panels to publish messages and to call services, and the log of sent messages and calls."""
