@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from app.core.messages.lazy_json import JsonIndex
 from app.core.messages.newest_only import NewestJobWorker
 from nep.errors import NepError
 from nep.i18n import _
+from nep.messages.codecs import content_of
 from nep.messages.message import Message
 
 LARGE_BYTES = 1_000_000
@@ -32,12 +34,18 @@ class ReadResult:
     index: JsonIndex | None = None
 
 
-def read(message: Message) -> ReadResult:
+def read(message: Message, summarize_image: Callable[[Message], object] | None = None) -> ReadResult:
     """Decode a message for display; large JSON is indexed instead (`app.core.messages.lazy_json`).
 
     If that fails, the result contains the reason (`ReadResult.error`). Thread-safe.
+
+    Args:
+        message: Message to read.
+        summarize_image: Returns the value of an image; None to decode its pixels.
     """
     try:
+        if summarize_image is not None and content_of(message.codec) == "image":
+            return ReadResult(message, summarize_image(message))
         if message.codec == "json" and message.size_bytes > LARGE_BYTES:
             index = JsonIndex(message.data)
             return ReadResult(message, index.root, index=index)

@@ -13,10 +13,11 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMenu, QWidget
 
 from app.core.messages import lazy_json
+from app.core.messages.inspected import NO_BASE
 from app.core.messages.reader import LARGE_BYTES
 from app.ui.intents import NewValueAlarm, OpenPanel
 from app.ui.panels.watch.inspector.body import LARGE, NOTHING, RAW, TREE
-from app.ui.panels.watch.inspector.diff import NO_BASE, changes_text, count_changes
+from app.ui.panels.watch.inspector.diff import changes_text, count_changes
 from app.ui.panels.watch.inspector.footer import message_info
 from app.ui.panels.watch.inspector.panel import PANEL, InspectorPanel
 from app.ui.panels.watch.inspector.tree_model import TreeNode
@@ -124,11 +125,12 @@ def test_latency_of_a_shown_message_does_not_grow(panel, window) -> None:
     window.session.send("/blackboard", blackboard())
     panel.refresh()
     panel.freeze.setChecked(True)
-    said = panel._message_info(panel._shown_message)
-    panel._shown_message.stamp_ns -= 600 * 10**9  # as if ten minutes old
-    panel._set_mode("raw")
+    said = panel.foot.info.text()
+    assert "latency" in said
+    panel.inspected.message.stamp_ns -= 600 * 10**9  # as if ten minutes old
+    press(button(panel.mode, "Raw"))
+    assert panel.body.page == RAW
     assert panel.foot.info.text() == said
-    assert panel._message_info(panel._shown_message) == said
 
 
 class Layouts(QObject):
@@ -177,7 +179,7 @@ def test_fast_messages_are_shown_at_ten_hertz_and_the_last_message_always(panel,
     now[0] += 0.1
     ticks(window, panel)
     assert panel.model.value()["n"] == 60
-    assert panel.foot.info.text().split("   ")[:2] == message_info(panel._shown_message).split("   ")[:2]
+    assert panel.foot.info.text().split("   ")[:2] == message_info(panel.inspected.message).split("   ")[:2]
 
 
 def test_resumed_panel_shows_the_current_message_immediately(panel, window) -> None:
@@ -260,7 +262,7 @@ def test_frozen_undecodable_message_is_shown_as_bytes_in_both_views(panel, windo
     window.session.send("/faces", {"good": 1})
     ticks(window, panel)
     press(button(panel.mode, "Tree"))
-    assert panel.body.page == RAW
+    assert (panel.body.page, panel.mode.value) == (RAW, "raw")
     assert panel.body.error_label.text().startswith("Can't decode the message as json: ")
     assert "6e 6f 74" in panel.bytes.text()
     panel.freeze.setChecked(False)
@@ -322,7 +324,7 @@ def test_large_message_is_never_decoded_in_the_gui_thread(qtbot, panel, window, 
     panel.show_topic("/blackboard")
     panel.compare.setChecked(True)
     for number in range(3):
-        panel.reader.clear()
+        panel.inspected.reader.clear()
         window.session.send("/blackboard", {"n": number, "data": ["x" * 90] * 110_000})
         qtbot.waitUntil(lambda wanted=number: (panel.refresh(), shown_number(panel) == wanted)[1])
     window.session.shown.topics["/speech/words"].newest = Message(

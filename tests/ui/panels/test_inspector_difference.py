@@ -8,8 +8,9 @@ import math
 import pytest
 from PySide6.QtCore import QModelIndex
 
+from app.core.messages.inspected import NO_BASE
 from app.core.messages.lazy_json import JsonIndex
-from app.ui.panels.watch.inspector.diff import MISSING, NO_BASE, child_diffs, differs, mark_of
+from app.ui.panels.watch.inspector.diff import MISSING, child_diffs, differs, mark_of
 from app.ui.panels.watch.inspector.tree_model import TreeModel, TreeNode
 
 

@@ -208,7 +208,7 @@ def test_inspector_shows_messages_of_another_network(qtbot, window: Window, look
         sink("ros /blackboard", [message("/blackboard", b'{"x": 7}')])
     ticks(window, panel, 5)
     assert panel.model.value() == {"x": 7}
-    assert panel._info_cache[1] == "8 B   ROS 1 doesn't report sequence numbers or latency"
+    assert panel.foot.info.text() == "8 B   ROS 1 doesn't report sequence numbers or latency"
     ros.tell(MasterLost("", REASON))
     ticks(window, panel, 2)
     assert panel.live.accessibleName() == "not responding"

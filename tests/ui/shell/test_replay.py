@@ -107,26 +107,26 @@ def test_inspector_shows_the_message_at_the_playhead_and_then_live_messages(
     window.tick()
     before = live(session, 1000)
     window.tick()
-    assert inspected(window)._shown_message is before
+    assert inspected(window).inspected.message is before
     opened(qtbot, window, path)
     for place in (70, 12, 41):
         at_ns, _message = whole[place]
         go_to(qtbot, window, at_ns)
         expected = [message for log_ns, message in whole if log_ns <= at_ns and message.topic == "/a"][-1]
-        until(qtbot, window, lambda seq=expected.seq: inspected(window)._shown_message.seq == seq)
-        assert bytes(inspected(window)._shown_message.data) == bytes(expected.data)
+        until(qtbot, window, lambda seq=expected.seq: inspected(window).inspected.message.seq == seq)
+        assert bytes(inspected(window).inspected.message.data) == bytes(expected.data)
         assert inspected(window).model.value() == expected.payload
         assert inspected(window).live.text == "recorded"
     live(session, 1001)
     window.tick()
-    assert inspected(window)._shown_message.seq == expected.seq
+    assert inspected(window).inspected.message.seq == expected.seq
     window.commands.run("replay.live")
     window.tick()
     assert session.replay is None
     assert inspected(window).live.text == "live"
     after = live(session, 1002)
     window.tick()
-    assert inspected(window)._shown_message is after
+    assert inspected(window).inspected.message is after
     assert "timeline" not in window.bench.open_names()
 
 

@@ -167,12 +167,14 @@ class Studio:
                 continue
             inspector.show_topic(topic)
             self.until(
-                lambda seq=newest[topic].seq: inspector._shown_message and inspector._shown_message.seq == seq
+                lambda seq=newest[topic].seq: (
+                    inspector.inspected.message and inspector.inspected.message.seq == seq
+                )
             )
             inspector.mode.set_value("raw")
             self.window.tick()
-            inspector.bytes.show_bytes(inspector._shown_message.data)
-            held[f"{topic} in hex"] = (bytes(inspector._shown_message.data), inspector.bytes.text())
+            inspector.bytes.show_bytes(inspector.inspected.message.data)
+            held[f"{topic} in hex"] = (bytes(inspector.inspected.message.data), inspector.bytes.text())
             inspector.mode.set_value("tree")
             self.window.tick()
             held[f"{topic} as a tree"] = rows(inspector.model, QModelIndex())

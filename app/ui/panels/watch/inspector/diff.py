@@ -9,6 +9,7 @@ from typing import Final, Literal
 
 import orjson
 
+from app.core.messages.inspected import NO_BASE, Sentinel
 from app.core.messages.lazy_json import LazyList, LazyObject
 from app.ui.panels.watch.inspector.values import is_container, keys_of, size_of, values_of
 from nep.i18n import _, lazy, ngettext
@@ -26,20 +27,7 @@ MARK_TEXTS: Mapping[Mark, str] = {
 }
 
 
-class _Sentinel:
-    """Type of the sentinels `NO_BASE` and `MISSING`, which are distinct from null."""
-
-    def __init__(self, text: str) -> None:
-        self._text = text
-
-    def __repr__(self) -> str:
-        return self._text
-
-
-NO_BASE: Final = _Sentinel("nothing to compare with")
-
-
-MISSING: Final = _Sentinel("missing")
+MISSING: Final = Sentinel("missing")
 
 
 def differs(before: object, after: object) -> bool:

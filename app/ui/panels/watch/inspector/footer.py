@@ -10,6 +10,8 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
+from app.core.network.topics import split_key
+from app.core.networks.kinds import find_kind
 from app.core.timeline.times import clock_text
 from app.ui.text import plain
 from app.ui.text.numbers import age_text, group_digits, latency_text, size_text
@@ -18,6 +20,7 @@ from app.ui.widgets import FixedWidthLabel, IconButton, Separator, label, paint
 from nep.i18n import _, lazy
 
 if TYPE_CHECKING:
+    from app.core.messages.inspected import InspectedMessage
     from app.core.networks.kinds import NetworkKind
     from nep.messages.message import Message
 
@@ -106,10 +109,16 @@ class Legend(QWidget):
 
 
 class Footer(QWidget):
-    """Footer with the path of the selected value, copy buttons, and the properties of the message below."""
+    """Footer with the path of the selected value, copy buttons, and the properties of the message below.
+
+    Attributes:
+        since_ns: Start of the subscription in ns since 1970.
+    """
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
+        self.since_ns = 0
+        self._message: Message | None = None
         self.path = label("", "code", role="textSecondary")
         self.path.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.path.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
@@ -138,10 +147,12 @@ class Footer(QWidget):
         for button in (self.copy_value, self.copy_path, self.plot):
             button.setEnabled(bool(path))
 
-    def clear(self) -> None:
-        """Remove the path; called before another topic is shown."""
-        self.show_path("")
-
-    def show_info(self, text: str) -> None:
-        """Show the properties of a message."""
+    def show_message(self, inspected: InspectedMessage) -> None:
+        """Show the properties of a message; nothing changes without a message."""
+        message = inspected.message
+        if message is None or message is self._message:  # latency and age are those at its arrival
+            return
+        self._message = message
+        network = find_kind(split_key(inspected.key)[0])
+        text = message_info(message, self.since_ns, network, is_recorded=inspected.is_recorded)
         self.info.setText(text)

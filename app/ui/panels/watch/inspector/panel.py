@@ -10,38 +10,29 @@ from PySide6.QtCore import QModelIndex, QPoint, Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QAbstractButton, QVBoxLayout
 
-from app.core.messages.reader import LARGE_BYTES, MessageReader, ReadResult
+from app.core.messages.inspected import InspectedMessage, Mode
+from app.core.messages.pace import UpdateLimiter
 from app.core.network.topics import split_key
-from app.core.networks.kinds import find_kind
 from app.core.networks.networks import topic_label
-from app.core.timeline.times import clock_text
 from app.ui.intents import NewValueAlarm, OpenPanel, PublishMessage
 from app.ui.panels.base import ANY_TYPE, Blocker, Panel, PanelContext, PanelWidget, paused_blocker
 from app.ui.panels.home import RowHome
 from app.ui.panels.watch.inspector.actions import InspectorActions
-from app.ui.panels.watch.inspector.body import LARGE, NOTHING, RAW, TABLE, TREE, InspectorBody
-from app.ui.panels.watch.inspector.diff import NO_BASE, count_changes
-from app.ui.panels.watch.inspector.footer import message_info
-from app.ui.panels.watch.inspector.pace import UpdateLimiter
+from app.ui.panels.watch.inspector.body import TREE, InspectorBody
 from app.ui.panels.watch.inspector.tree_model import TreeNode, field_of, steps_of
-from app.ui.panels.watch.inspector.values import decode_now, payload_or_default
-from app.ui.widgets import Chip, IconButton
+from app.ui.panels.watch.inspector.values import as_container, image_summary
+from app.ui.widgets import Chip, EmptyAction, IconButton
 from app.ui.widgets.field_drag import FieldDrag
 from app.ui.widgets.menus import Menu
 from nep.i18n import _, lazy, pgettext
-from nep.messages.codecs import content_of
 from nep.messages.fields import path_text
 
 if TYPE_CHECKING:
     from app.core.messages.lazy_json import JsonIndex
-    from app.core.messages.query import QueryResult
     from app.core.network.topics import Topic
     from app.core.network.watches import Suspendable, Watch
-    from nep.messages.message import Message
 
-MAX_EXPANDED_ROWS = 24
 FADE_REPAINT_HZ = 7.0  # lower than the rate of message updates, which paint the marks too
-PREVIOUS_MESSAGE, PINNED_MESSAGE = lazy("Previous message"), lazy("Pinned message")
 
 
 class InspectorPanel(PanelWidget):
@@ -50,24 +41,16 @@ class InspectorPanel(PanelWidget):
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Inspector"))
         self.clock = time.monotonic
-        self._topic = ""
+        self.inspected = InspectedMessage(image_summary)
         self._watch: Watch | None = None
-        self._shown_message: Message | None = None
-        self._requested_large_message: Message | None = None  # large message that the user asked to decode
-        self._reading: ReadResult | None = None  # decoded message in the tree
-        self._is_raw_mode = self._is_table_mode = False
-        self._since_ns = 0  # start of the subscription
-        self._update_limiter, self._fade_limiter = UpdateLimiter(), UpdateLimiter(burst=1, hz=FADE_REPAINT_HZ)
-        self._info_cache: tuple[Message | None, str] = (None, "")
-        self._value: object = None
-        self._previous_value: object = NO_BASE  # previous value of the topic, for comparison
-        self._pinned_value: object = NO_BASE
-        self._pinned_text = ""
-        self.reader = MessageReader()
-        self.body = InspectorBody(self.theme, self._search_source, context.show_toast)
+        self._fade_limiter = UpdateLimiter(burst=1, hz=FADE_REPAINT_HZ)
+        self.body = InspectorBody(
+            self.theme, self._search_source, context.show_toast,
+            empty_action=self._empty_action, decode_large=self._decode_large,
+        )  # fmt: skip
         self._make_header()
         self._make_body()
-        self._show_empty()
+        self._show_topic()
 
     # -- construction -------------------------------------------------------------------------------------
 
@@ -77,7 +60,7 @@ class InspectorPanel(PanelWidget):
         self.freeze = IconButton(theme, "snowflake", _("Freeze this panel"), checkable=True, size=26)
         pin = _("Pin this message to compare others with it")
         self.pin = IconButton(theme, "pin", pin, checkable=True, size=26)
-        self.freeze.toggled.connect(lambda _on: self._refresh_now())
+        self.freeze.toggled.connect(lambda _on: self._follow())
         self.pin.toggled.connect(self._pin)
         self.header = [self.live, self.freeze, self.pin]
 
@@ -89,9 +72,10 @@ class InspectorPanel(PanelWidget):
         self.history.selection_changed.connect(self._history_selected)
         self.finder.query_changed.connect(self._query_changed)
         self.inspector_actions = InspectorActions(
-            self.theme, self, body, lambda: self._shown_message, self._full_value,
+            self.theme, self, body,
+            lambda: self.inspected.message, lambda: as_container(self.inspected.value),
             find=self.focus_filter, toast=self.context.show_toast,
-            plot=lambda path: self.context.plot(self._topic, path),
+            plot=lambda path: self.context.plot(self.inspected.key, path),
         )  # fmt: skip
         self.foot.copy_value.clicked.connect(self.inspector_actions.copy_value)
         self.foot.copy_path.clicked.connect(self.inspector_actions.copy_path)
@@ -102,8 +86,10 @@ class InspectorPanel(PanelWidget):
         self.tree.customContextMenuRequested.connect(self._show_menu)
         self.mode.changed.connect(self._set_mode)
         self.compare = body.compare
-        self.compare.toggled.connect(lambda _on: self._show_value())
-        self.strip.changes_only_toggled.connect(lambda _on: self._show_value())
+        self.compare.toggled.connect(lambda _on: self._show())
+        self.strip.changes_only_toggled.connect(lambda _on: self._show())
+        self.inspector_actions.set_enabled(False)
+        body.pages.currentChanged.connect(lambda page: self.inspector_actions.set_enabled(page == TREE))
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(body)
@@ -112,215 +98,81 @@ class InspectorPanel(PanelWidget):
 
     def show_topic(self, name: str) -> None:
         """Switch to another topic, or to none if the name is empty."""
-        if name == self._topic:
+        if name == self.inspected.key:
             return
         self._close_watch()
         self.history.reset()
-        self._topic = name
-        self._shown_message = self._requested_large_message = self._reading = None
-        self._value, self._previous_value, self._pinned_value = None, NO_BASE, NO_BASE
-        self._is_raw_mode = False
-        self.model.clear()
-        self.query.discard_pending()
+        self.inspected.open(name)
         self.body.objects.reset()
-        self.foot.clear()
-        self._update_limiter.reset()
         for button in (self.freeze, self.pin):
             button.setChecked(False)
         self.set_title(_("Inspector"), topic_label(name))
         if name:
-            self._since_ns = time.time_ns()
+            self.foot.since_ns = time.time_ns()
             self._watch = self.world.watch(name)
             self.history.start(self.world.series, name)
             self.world.mark_seen(name)
-        self._show_empty()
+        self._show_topic()
+
+    def _show_topic(self) -> None:
+        has_topic = bool(self.inspected.key)
+        for button in (self.freeze, self.pin):
+            button.setVisible(has_topic)
+        if not has_topic:
+            self.live.set("")
+        self._show()
+
+    def _show(self) -> None:
+        self.body.show_message(self.inspected, self.clock())
 
     def source_changed(self) -> None:
-        topic = self._topic
+        topic = self.inspected.key
         self.show_topic("")
         self.show_topic(topic)
 
     def refresh(self) -> None:
-        if not self._topic:
+        key, world, now = self.inspected.key, self.world, self.clock()
+        if not key:
             return
-        topic, is_recorded = self.world.topic(self._topic), not self.world.is_live
+        topic, is_recorded = world.topic(key), not world.is_live
         self.history.clamp_selection()
         is_earlier = self.history.selected_number is not None
         self.live.set(*chip_state(topic, self.is_frozen, is_recorded=is_recorded, is_earlier=is_earlier))
-        newest, is_shown = topic.newest if topic is not None and topic.gone_s is None else None, False
-        if (
-            topic is not None
-            and newest is not None
-            and newest is not self._shown_message
-            and not self.is_display_fixed
-        ):
-            is_shown = self._update_limiter.try_acquire(self.clock())
-            if is_shown:
-                self._show_message(newest)
-        elif is_recorded and newest is None and self._shown_message is not None and not self.is_display_fixed:
-            self._show_no_message()
-        if self.body.page == NOTHING:
-            self._show_waiting(topic)
-        reading = self.reader.pop_result()
-        if reading is not None and not self._is_raw_mode:
-            self._show_decoded(reading)
-        query_result = self.query.pop_result(self.clock())
-        if query_result is not None and self._value is not None:
-            self._show_query_result(query_result)
+        is_shown = self.inspected.update(
+            topic,
+            now,
+            is_paused=self.is_display_fixed,
+            is_recorded=is_recorded,
+            problem=world.networks.read_problem(key),
+        )
+        if is_shown:
+            self.body.show_message(self.inspected, now)
+        query_result = self.query.pop_result(now)
+        if query_result is not None:
+            self.body.show_query_result(query_result, now)
         self.history.refresh(is_busy=is_shown)
-        self._repaint_fading(is_shown=is_shown)
+        self._repaint_fading(now, is_shown=is_shown)
 
-    def _repaint_fading(self, *, is_shown: bool) -> None:
+    def _repaint_fading(self, now: float, *, is_shown: bool) -> None:
         # A message that was just shown has painted its marks already.
         if is_shown:
-            self._fade_limiter.drain(self.clock())
-        elif (
-            self.body.page == TREE and self.tree.is_fading() and self._fade_limiter.try_acquire(self.clock())
-        ):
+            self._fade_limiter.drain(now)
+        elif self.body.page == TREE and self.tree.is_fading() and self._fade_limiter.try_acquire(now):
             self.tree.viewport().update()
 
-    def _refresh_now(self) -> None:
-        self._update_limiter.reset()
+    def _follow(self) -> None:
+        self.inspected.allow_update()
         self.refresh()
 
-    def _show_no_message(self) -> None:
-        # The playhead is before the topic's first message.
-        self.reader.clear()
-        self._shown_message = self._requested_large_message = self._reading = None
-        self._value, self._previous_value = None, NO_BASE
-        self.model.clear()
-        self.query.discard_pending()
-        self.foot.clear()
-        self._show_page(NOTHING)
-
-    def _show_waiting(self, topic: Topic | None) -> None:
-        problem = self.world.networks.read_problem(self._topic)
-        if problem:
-            self.body.show_undecodable(topic_label(self._topic), problem, self.doctor_action(self._topic))
-        else:
-            has_publisher = topic is not None and topic.publishers > 0
-            self.body.show_waiting(topic_label(self._topic), has_publisher, self.doctor_action(self._topic))
-
-    def _show_message(self, message: Message) -> None:
-        is_large = message.size_bytes > LARGE_BYTES and content_of(message.codec) != "image"
-        if self._is_raw_mode:
-            self._show_raw(message, "")
-        elif is_large and message.codec != "json" and message is not self._requested_large_message:
-            self._offer_large(message)
-        elif is_large:
-            self._decode_in_background(message)
-        else:
-            self._show_decoded(decode_now(message))
-
-    def _decode_in_background(self, message: Message) -> None:
-        # Decoded in the reader's thread; the old contents are shown until then.
-        if self.history.selected_number is not None:  # the user waits for exactly this message
-            self.reader.submit(message)
-        elif not self.reader.submit_throttled(message, self.clock()):
-            return
-        if self._shown_message is None or self.body.page == LARGE:
-            self.body.show_large(message.size_bytes, _("Reading the message…"))
-            self._show_page(LARGE)
-
-    def _show_decoded(self, reading: ReadResult) -> None:
-        message = reading.message
-        if reading.error is not None:
-            self._show_raw(message, reading.error)
-            return
-        is_new = message is not self._shown_message
-        self._shown_message, self._reading = message, reading
-        if is_new:
-            self._previous_value = self._value if self._value is not None else NO_BASE
-            topic = self.world.topic(self._topic)
-            previous = topic.previous if topic is not None else None
-            if self.history.selected_number is not None:
-                previous = self.history.previous_message()
-            if message.size_bytes <= LARGE_BYTES and previous is not None:
-                self._previous_value = payload_or_default(previous, self._previous_value)
-            self.finder.invalidate_matches()
-        self._value = reading.value
-        self._show_value()
-        self.foot.show_info(self._message_info(message))
-        self._show_page(TABLE if self._is_table_mode else TREE)
-
-    def _message_info(self, message: Message) -> str:
-        # Cached per message, because latency and age are those at its arrival.
-        if message is not self._info_cache[0]:
-            kind = find_kind(split_key(self._topic)[0])
-            is_recorded = not self.world.is_live
-            self._info_cache = (message, message_info(message, self._since_ns, kind, is_recorded=is_recorded))
-        return self._info_cache[1]
-
-    def _show_value(self) -> None:
-        if self._shown_message is None or self._value is None:
-            return
-        if self.query.has_query:
-            self.strip.hide()
-            self.query.request_evaluation(self._value)
-            return
-        if self._is_table_mode:
-            self.strip.hide()
-            self.body.objects.show_message(self._value, self.clock())
-            return
-        is_first = not self.model.rowCount()
-        base: object = NO_BASE
-        if self.is_comparing:
-            base = self._pinned_value if self.pin.isChecked() else self._previous_value
-            compared_with = self._pinned_text if self.pin.isChecked() else _(PREVIOUS_MESSAGE)
-            self.strip.set_summary(compared_with, *count_changes(self._value, base))
-        self.strip.setVisible(self.is_comparing and self.body.page == TREE)
-        changes_only = (
-            self.is_comparing and base is not NO_BASE and self.strip.changes_only_button.isChecked()
-        )
-        self.model.set_value(self._value, self.clock(), base, changes_only=changes_only)
-        if is_first:
-            self.tree.expand_small(MAX_EXPANDED_ROWS)
-
-    def _show_query_result(self, result: QueryResult) -> None:
-        if self._is_table_mode:
-            self.body.objects.show_query_objects(result.values.items(), self.clock())
-            return
-        is_first = not self.model.rowCount()
-        self.model.set_value(result.values, self.clock())
-        if is_first:
-            self.tree.expand_small(MAX_EXPANDED_ROWS)
-
-    def _show_raw(self, message: Message, reason: str) -> None:
-        self._shown_message = message
-        self.foot.show_info(self._message_info(message))
-        self.bytes.show_bytes(message.data)
-        text = _("Can't decode the message as {codec}: {reason}.").format(codec=message.codec, reason=reason)
-        self.body.error_label.setText(text if reason else "")
-        self._show_page(RAW)
-
-    def _offer_large(self, message: Message) -> None:
-        self._shown_message = message
-        explanation = _("{codec} messages larger than 1 MB are decoded only on request.").format(
-            codec=message.codec
-        )
-        self.body.show_large(message.size_bytes, explanation, self._decode_large)
-        self._show_page(LARGE)
+    def _empty_action(self, key: str) -> EmptyAction:
+        choose = lambda: self.context.request(OpenPanel("topics"))  # noqa: E731
+        return self.doctor_action(key) if key else EmptyAction(_("Choose a topic"), choose, "list")
 
     def _decode_large(self) -> None:
         # Also freezes the panel, because the next message would replace this one.
-        if self._shown_message is not None:
-            self._requested_large_message = self._shown_message
-            self.freeze.setChecked(True)
-            self.reader.submit(self._shown_message)
-            self.body.show_large(self._shown_message.size_bytes, _("Reading the message…"))
-
-    def _show_page(self, page: int) -> None:
-        self.body.show_page(page, is_comparing=self.is_comparing)
-        self.inspector_actions.set_enabled(page == TREE)
-
-    def _show_empty(self) -> None:
-        choose = lambda: self.context.request(OpenPanel("topics"))  # noqa: E731
-        self.body.show_empty(topic_label(self._topic), choose, self.doctor_action(self._topic))
-        if not self._topic:
-            self.live.set("")
-        for button in (self.freeze, self.pin):
-            button.setVisible(bool(self._topic))
-        self._show_page(NOTHING)
+        self.freeze.setChecked(True)
+        self.inspected.decode_large()
+        self.refresh()
 
     # -- user actions -------------------------------------------------------------------------------------
 
@@ -337,10 +189,10 @@ class InspectorPanel(PanelWidget):
     @property
     def is_comparing(self) -> bool:
         """True if the tree shows the differences to another message."""
-        return (self.compare.isChecked() or self.pin.isChecked()) and not self.query.has_query
+        return self.body.is_comparing(self.inspected)
 
     def awaited_topic(self) -> str:
-        return self._topic if self._shown_message is None else ""
+        return self.inspected.key if self.inspected.message is None else ""
 
     def blockers(self) -> list[Blocker]:
         return [paused_blocker(self.title(), self._resume_updates)] if self.is_display_fixed else []
@@ -350,22 +202,18 @@ class InspectorPanel(PanelWidget):
         self.freeze.setChecked(False)
 
     def _pin(self, is_pinned: bool) -> None:
-        self._pinned_value = self._value if is_pinned and self._value is not None else NO_BASE
-        stamp_ns = self._shown_message.stamp_ns if self._shown_message is not None else None
-        self._pinned_text = _(PINNED_MESSAGE)
-        if self.history.selected_number is not None and stamp_ns is not None and 0 <= stamp_ns < 2**62:
-            time_text = clock_text(stamp_ns)
-            self._pinned_text = _("{message} from {clock}").format(message=_(PINNED_MESSAGE), clock=time_text)
-        self._show_value()
+        is_earlier = self.history.selected_number is not None
+        self.inspected.pin(is_pinned=is_pinned, is_earlier=is_earlier)
+        self._show()
 
     def _history_selected(self) -> None:
-        self.reader.clear()
+        is_newest = self.history.selected_number is None
         message = self.history.selected_message()
-        if message is not None:
-            self._show_message(message)
-        elif self.history.selected_number is None:
+        if is_newest or message is not None:
+            self.inspected.select(message, self.history.previous_message())
+        if is_newest:
             self.freeze.setChecked(False)
-            self._refresh_now()
+        self._follow()
 
     def _query_changed(self, text: str) -> None:
         # "" ends the query.
@@ -374,20 +222,14 @@ class InspectorPanel(PanelWidget):
         self.finder.set_invalid(is_invalid=not self.query.set_query(text))
         self.compare.setVisible(not text)  # parts of messages can't be compared, and the query needs the room
         self.model.clear()
-        self._show_value()
+        self._show()
 
-    def _set_mode(self, mode: str) -> None:
-        self._is_raw_mode, self._is_table_mode = mode == "raw", mode == "table"
-        if self._is_table_mode and self.body.page == TREE and not self.query.has_query:
+    def _set_mode(self, mode: Mode) -> None:
+        if mode == "table" and self.body.page == TREE and not self.query.has_query:
             index = self.tree.currentIndex()
             self.body.objects.select_list(steps_of(self.model.node(index)) if index.isValid() else ())
-        displayed = self._shown_message
-        if displayed is None:
-            return
-        if self._reading is not None and self._reading.message is displayed and not self._is_raw_mode:
-            self._show_decoded(self._reading)
-        elif self.world.topic(self._topic) is not None:
-            self._show_message(displayed)
+        self.inspected.set_mode(mode)
+        self.refresh()
 
     def _row_selected(self, index: QModelIndex) -> None:
         self.foot.show_path(self.model.node(index).path if index.isValid() else "")
@@ -401,26 +243,22 @@ class InspectorPanel(PanelWidget):
     def _start_drag(self, node: TreeNode) -> None:
         path = field_of(node)
         if path:
-            FieldDrag(self.tree.viewport(), self._topic, path)
-
-    def _full_value(self) -> object:
-        # A query or the table may show only parts of the message.
-        shows_parts = self.query.has_query or self._is_table_mode
-        return self._value if shows_parts else self.model.value()
+            FieldDrag(self.tree.viewport(), self.inspected.key, path)
 
     def _search_source(self) -> tuple[object, JsonIndex | None]:
-        return self._full_value(), self._reading.index if self._reading is not None else None
+        reading = self.inspected.reading
+        return as_container(self.inspected.value), reading.index if reading is not None else None
 
     def _show_menu(self, position: QPoint) -> None:
         menu = Menu(self.theme, self)
         menu.addActions(self.inspector_actions.menu_actions())
         index = self.tree.currentIndex()
-        if index.isValid() and self._topic and not split_key(self._topic)[0]:
+        if index.isValid() and self.inspected.key and not split_key(self.inspected.key)[0]:
             request = self.context.request
-            alarm = NewValueAlarm(self._topic, path_text(steps_of(self.model.node(index))))
+            alarm = NewValueAlarm(self.inspected.key, path_text(steps_of(self.model.node(index))))
             menu.addSeparator()
             menu.addAction(self.theme.icon("bell"), _("New alarm"), lambda: request(alarm))
-            publish = PublishMessage(self._topic)
+            publish = PublishMessage(self.inspected.key)
             menu.addAction(self.theme.icon("send"), _("Publish to this topic"), lambda: request(publish))
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.popup(self.tree.viewport().mapToGlobal(position))
@@ -441,10 +279,10 @@ class InspectorPanel(PanelWidget):
 
     def save_state(self) -> dict[str, object]:
         return {
-            "topic": self._topic,
+            "topic": self.inspected.key,
             "compare": self.compare.isChecked(),
             "changes_only": self.strip.changes_only_button.isChecked(),
-            "table": self._is_table_mode,
+            "table": self.inspected.mode == "table",
             "query": self.finder.field.text() if self.finder.is_query else "",
         }
 
@@ -454,13 +292,12 @@ class InspectorPanel(PanelWidget):
             self.show_topic(topic)
         self.compare.setChecked(state.get("compare") is True)
         self.strip.changes_only_button.setChecked(state.get("changes_only") is True)
-        self._is_table_mode = state.get("table") is True
+        self.inspected.mode = "table" if state.get("table") is True else "tree"
         query = state.get("query")
         if isinstance(query, str) and query.startswith("$"):
             self.finder.field.setText(query)
 
     def _close_watch(self) -> None:
-        self.reader.clear()
         self.history.pause()
         if self._watch is not None:
             self._watch.close()
@@ -468,8 +305,8 @@ class InspectorPanel(PanelWidget):
 
     def resume(self) -> None:
         if self._watch is not None and self._watch.is_suspended:
-            self._since_ns = time.time_ns()
-            self.history.start(self.world.series, self._topic)
+            self.foot.since_ns = time.time_ns()
+            self.history.start(self.world.series, self.inspected.key)
         super().resume()
 
     def suspend(self) -> None:
@@ -484,7 +321,7 @@ class InspectorPanel(PanelWidget):
 
     def dispose(self) -> None:
         self._close_watch()
-        self.reader.close()
+        self.inspected.close()
         self.query.close_worker()
 
 

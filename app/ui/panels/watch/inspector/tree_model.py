@@ -12,18 +12,24 @@ from dataclasses import dataclass
 
 from PySide6.QtCore import QAbstractItemModel, QModelIndex, QPersistentModelIndex, Qt
 
+from app.core.messages.inspected import NO_BASE
 from app.core.messages.query import FoundPath
 from app.core.series.field_path import ALL, FieldPath, Step, kind_of_value
 from app.ui.panels.watch.inspector.diff import (
     MARK_TEXTS,
-    MISSING,
-    NO_BASE,
     ChildDiff,
     Mark,
     child_diffs,
     differs,
 )
-from app.ui.panels.watch.inspector.values import is_container, keys_of, size_of, value_text, values_of
+from app.ui.panels.watch.inspector.values import (
+    as_container,
+    is_container,
+    keys_of,
+    size_of,
+    value_text,
+    values_of,
+)
 from app.ui.text import plain
 from nep.i18n import _
 
@@ -198,11 +204,12 @@ class TreeModel(QAbstractItemModel):
             changes_only: True to omit nodes that are equal in both messages.
         """
         is_first = not self._root.children
-        container = _as_container(value)
+        container = as_container(value)
+        base_container = base if base is NO_BASE else as_container(base)
         self._shows_changes_only = changes_only
         self._is_changing = True
         try:
-            self._update(self._root, (0, container, _as_container(base), ""), None if is_first else now)
+            self._update(self._root, (0, container, base_container, ""), None if is_first else now)
             if not self._root.children:
                 self._load(self._root, PAGE_SIZE)
         finally:
@@ -320,10 +327,6 @@ class TreeModel(QAbstractItemModel):
 def _make_node(parent: TreeNode, row: int, part: ChildDiff) -> TreeNode:
     key, value, base, mark = part
     return TreeNode(key, value, parent, row, parent.depth + 1, base=base, mark=mark)
-
-
-def _as_container(value: object) -> object:
-    return value if value is NO_BASE or value is MISSING or is_container(value) else {"value": value}
 
 
 def _renumber(nodes: Sequence[TreeNode]) -> None:

@@ -19,7 +19,7 @@ from PySide6.QtCore import (
 from PySide6.QtGui import QColor, QFocusEvent, QFontMetricsF, QMouseEvent, QPainter, QPen
 from PySide6.QtWidgets import QApplication, QStyledItemDelegate, QStyleOptionViewItem, QTreeView
 
-from app.ui.panels.watch.inspector.diff import NO_BASE
+from app.core.messages.inspected import NO_BASE
 from app.ui.panels.watch.inspector.tree_model import NODE_ROLE, TreeModel, TreeNode
 from app.ui.panels.watch.inspector.values import is_container, size_of, value_text
 from app.ui.theme.icons import paint_icon

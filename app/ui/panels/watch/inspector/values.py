@@ -8,11 +8,8 @@ from itertools import islice
 from typing import TYPE_CHECKING
 
 from app.core.messages.lazy_json import LazyList, LazyObject
-from app.core.messages.reader import LARGE_BYTES, ReadResult, read
 from app.ui.text.numbers import size_text
-from nep.errors import NepError
 from nep.i18n import _, ngettext
-from nep.messages.codecs import content_of
 
 if TYPE_CHECKING:
     from nep.messages.message import Message
@@ -26,6 +23,11 @@ def is_container(value: object) -> bool:
     if isinstance(value, Mapping):
         return True
     return isinstance(value, Sequence) and not isinstance(value, (str, bytes, bytearray, memoryview))
+
+
+def as_container(value: object) -> object:
+    """Return an object or list unchanged, and any other message as an object with the key ``value``."""
+    return value if is_container(value) else {"value": value}
 
 
 def keys_of(value: object, count: int) -> list[str | int]:
@@ -105,32 +107,6 @@ def clipboard_text(value: object) -> str:
     if isinstance(value, (LazyList, LazyObject)):
         return str(value.text, "utf-8", "replace")
     return json.dumps(value, indent=2, ensure_ascii=False, default=str)
-
-
-def decode_now(message: Message) -> ReadResult:
-    """Decode a small message, or summarize an image, on the calling thread.
-
-    Errors are not raised, but returned in the `ReadResult`.
-    """
-    if content_of(message.codec) != "image":
-        return read(message)
-    try:
-        return ReadResult(message, image_summary(message))
-    except NepError as error:
-        return ReadResult(message, error=str(error))
-
-
-def payload_or_default(message: Message, default: object) -> object:
-    """Decode a small message on the calling thread.
-
-    Args:
-        message: Message to decode.
-        default: Returned for images, for large messages, and if decoding fails.
-    """
-    if message.size_bytes > LARGE_BYTES or content_of(message.codec) == "image":
-        return default
-    decoded = read(message)
-    return default if decoded.error is not None else decoded.value
 
 
 def image_summary(message: Message) -> Mapping[str, object]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.ui.panels.watch.inspector.pace import MAX_BURST, MAX_UPDATE_HZ, UpdateLimiter
+from app.core.messages.pace import MAX_BURST, MAX_UPDATE_HZ, UpdateLimiter
 
 
 def let_through(pace: UpdateLimiter, begin_s: float, seconds: float, hz: float = 30.0) -> int:
