@@ -274,9 +274,7 @@ class Session:
     def tick(self) -> None:
         """Apply the events and messages that threads have posted since the last tick."""
         start_s = self._clock()
-        drain_result = self._mailbox.drain()
-        self.live.receive(drain_result)
-        for event in drain_result.events:
+        for event in self.live.take_events():
             with self.guarded(lazy("handle {event}"), event=type(event).__name__):
                 self._on_event(event)
         for part in self._parts:

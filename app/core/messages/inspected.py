@@ -163,17 +163,14 @@ class InspectedMessage:
         elif message is not None and self._defer(message, preceding, now_s, is_requested=is_requested):
             result = None
         if result is not None:
-            self._accept(result, preceding if result.message is message else None)
+            self.message, self._result = result.message, result
+            self._preceding = preceding if result.message is message and _is_small(preceding) else None
             self.pending = self.pending if self.pending is message else None
+            if result.error is None and (self.reading is None or self.reading.message is not result.message):
+                self._last_value = NO_BASE if self.reading is None else self.reading.value
+                self.reading = result
         last_state, self._last_state = self._last_state, self._state()
         return self._last_state != last_state
-
-    def _accept(self, result: ReadResult, preceding: Message | None) -> None:
-        self.message, self._result = result.message, result
-        self._preceding = preceding if preceding is not None and _is_small(preceding) else None
-        if result.error is None and (self.reading is None or self.reading.message is not self.message):
-            self._last_value = NO_BASE if self.reading is None else self.reading.value
-            self.reading = result
 
     def _defer(
         self, message: Message, preceding: Message | None, now_s: float, *, is_requested: bool
@@ -292,6 +289,6 @@ def _is_large(message: Message) -> bool:
     return message.size_bytes > LARGE_BYTES and content_of(message.codec) != "image"
 
 
-def _is_small(message: Message) -> bool:
+def _is_small(message: Message | None) -> bool:
     # True if the message is quickly decoded.
-    return message.size_bytes <= LARGE_BYTES and content_of(message.codec) != "image"
+    return message is not None and message.size_bytes <= LARGE_BYTES and content_of(message.codec) != "image"

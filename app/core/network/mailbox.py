@@ -36,21 +36,6 @@ class Batch:
         return len(self.messages) + self.dropped
 
 
-@dataclass(slots=True)
-class DrainResult:
-    """Result of a drain.
-
-    Attributes:
-        batches: New messages by topic.
-        events: New events, oldest first.
-        lost_event_count: Number of events that were lost because the queue was full.
-    """
-
-    batches: dict[str, Batch]
-    events: list[object]
-    lost_event_count: int
-
-
 class _Ring:
     __slots__ = ("dropped", "messages", "size_bytes")
 
@@ -127,11 +112,19 @@ class Mailbox:
             else:
                 self._events.append(event)
 
-    def drain(self) -> DrainResult:
-        """Return and clear all messages and events posted since the last drain."""
+    def drain(self) -> dict[str, Batch]:
+        """Return and clear all messages posted since the last call, by topic."""
         with self._lock:
             rings, self._rings = self._rings, {}
+        return {topic: Batch(list(ring.messages), ring.dropped) for topic, ring in rings.items()}
+
+    def drain_events(self) -> tuple[list[object], int]:
+        """Return and clear all events posted since the last call, oldest first.
+
+        Returns:
+            The events, and the number of events that were lost because the queue was full.
+        """
+        with self._lock:
             events, self._events = self._events, deque()
-            lost_event_count, self._lost_event_count = self._lost_event_count, 0
-        batches = {topic: Batch(list(ring.messages), ring.dropped) for topic, ring in rings.items()}
-        return DrainResult(batches, list(events), lost_event_count)
+            lost_count, self._lost_event_count = self._lost_event_count, 0
+        return list(events), lost_count

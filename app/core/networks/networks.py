@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import count
 from typing import Literal, Protocol
@@ -374,12 +374,3 @@ def topic_label(key: str) -> str:
     """Return the display name of a topic: "/camera", or "/camera on ROS 2"."""
     name, topic = split_key(key)
     return _("{topic} on {network}").format(topic=topic, network=network_label(name)) if name else topic
-
-
-def split_by_network(batches: Mapping[str, Batch]) -> tuple[dict[str, Batch], dict[str, Batch]]:
-    """Split batches by topic key into batches of the native network and batches of all other networks."""
-    native: dict[str, Batch] = {}
-    other_batches: dict[str, Batch] = {}
-    for key, batch in batches.items():
-        (other_batches if split_key(key)[0] else native)[key] = batch
-    return native, other_batches

@@ -9,7 +9,7 @@ from app.core.alerts.alerts import Alerts
 from app.core.faults import FaultAlerts, log_errors
 from app.core.network.decode_checks import CheckResult, DecodeChecker
 from app.core.network.graph_changes import change_messages
-from app.core.network.mailbox import Batch, DrainResult, Mailbox
+from app.core.network.mailbox import Batch, Mailbox
 from app.core.network.master import MasterChangeDetector, MasterState
 from app.core.network.source import (
     GraphReceived,
@@ -21,7 +21,7 @@ from app.core.network.source import (
     WatchFailed,
 )
 from app.core.network.topics import split_key
-from app.core.networks.networks import NetworkEvent, Networks, split_by_network
+from app.core.networks.networks import NetworkEvent, Networks
 from app.core.storage.settings import Settings
 from app.core.world.world import World
 from app.intents import OPEN_DOCTOR_LABEL, OpenDoctor
@@ -81,7 +81,6 @@ class LiveWorld(World):
         self.master = MasterState("searching", self.source.address)
         self._master_change_detector = MasterChangeDetector()
         self.batches: Mapping[str, Batch] = {}
-        self._all_batches: Mapping[str, Batch] = {}
         self.new_graph: GraphView | None = None
 
     def start(self) -> None:
@@ -89,10 +88,10 @@ class LiveWorld(World):
         self.source.start()
         self.networks.start()
 
-    def receive(self, drain_result: DrainResult) -> None:
-        """Begin a tick with the messages since the last one, by topic key. `tick` applies them."""
-        self._all_batches, self.batches, self.new_graph = drain_result.batches, {}, None
-        lost_count = drain_result.lost_event_count
+    def take_events(self) -> list[object]:
+        """Begin a tick, and return the events since the last one, oldest first. Call `tick` after them."""
+        self.batches, self.new_graph = {}, None
+        events, lost_count = self._mailbox.drain_events()
         if lost_count:
             self._alerts.raise_alert(
                 "mailbox",
@@ -105,6 +104,7 @@ class LiveWorld(World):
                 _("Panels may be up to a second out of date."),
                 count=lost_count,
             )
+        return events
 
     def on_event(self, event: LiveEvent) -> None:
         """Apply an event of a source."""
@@ -134,18 +134,18 @@ class LiveWorld(World):
 
     def tick(self) -> None:
         """Apply the messages since the last tick, and update the ages of topics and nodes."""
-        self.batches, other_batches = split_by_network(self._all_batches)
-        for topic, batch in self.batches.items():
-            with self._faults.guarded(lazy("receive messages of {topic}"), topic=topic):
-                if topic in LOG_TOPICS:
-                    self.console.add_messages(batch.messages, batch.dropped)
-                self.add(topic, batch)
-        now = self._clock()
-        for key, batch in other_batches.items():
+        batches, now = self._mailbox.drain(), self._clock()
+        self.batches = {key: batch for key, batch in batches.items() if not split_key(key)[0]}
+        for key, batch in batches.items():
             with self._faults.guarded(lazy("receive messages of {topic}"), topic=key):
-                self.networks.add(key, batch, now)
+                if key in LOG_TOPICS:
+                    self.console.add_messages(batch.messages, batch.dropped)
+                if key in self.batches:
+                    self.add(key, batch)
+                else:
+                    self.networks.add(key, batch, now)
         with self._faults.guarded(lazy("update the plots")):
-            self.series.dispatch(self._all_batches)
+            self.series.dispatch(batches)
         now_ns = self.now_ns()
         self.topics.update_ages(now, now_ns)
         self.nodes.update_ages(now)
@@ -153,7 +153,7 @@ class LiveWorld(World):
 
     def close(self) -> None:
         """Leave all networks, and release the messages of the last tick, which may be in shared memory."""
-        self._all_batches, self.batches = {}, {}
+        self.batches = {}
         for close in (self.images.close, self.source.close, self.networks.close):
             with log_errors("leave the network"):
                 close()

@@ -14,7 +14,7 @@ from app.core.network.mailbox import Batch
 from app.core.network.source import GraphReceived, MasterFound, MasterLost, WatchFailed
 from app.core.network.topics import Topic, Topics, key_of, split_key
 from app.core.networks.kinds import KINDS, find_kind
-from app.core.networks.networks import lost_message, split_by_network
+from app.core.networks.networks import lost_message
 from app.core.networks.source import OtherSource
 from app.core.session import Session
 from app.core.storage.settings import Settings
@@ -36,13 +36,11 @@ def message(size: int = 10) -> Message:
     return Message("/a", bytes(size), "bytes", "bytes")
 
 
-def test_topic_keys_and_batches_are_split_by_network() -> None:
+def test_topic_keys_are_split_into_network_and_topic() -> None:
     assert split_key(key_of("ros2", "/camera")) == ("ros2", "/camera")
     assert split_key(key_of("", "/camera")) == ("", "/camera")
     assert split_key(key_of("ros", "/a b c")) == ("ros", "/a b c"), "strangers may name a topic anything"
     assert Topic("/camera", network="ros").key == "ros /camera"
-    native, others = split_by_network({"/a": Batch(), "ros /a": Batch()})
-    assert (list(native), list(others)) == (["/a"], ["ros /a"])
 
 
 def test_network_is_observed_only_when_selected_and_again_at_next_start(world: World) -> None:

@@ -105,7 +105,7 @@ def test_selected_topics_are_sent_completely_and_panels_receive_watched_topics(p
     sender.pass_time(2.0)
     assert sender.taken() == some(whole, "/a", "/camera")
     assert max(sender.late) < MAX_DELAY_S
-    assert set(sender.source.pop_results().drain_result.batches) == {"/b"}
+    assert set(sender.source.pop_results().batches) == {"/b"}
     sender.do(lambda playback: playback.seek(whole[0][0]))
     sender.do(Playback.play)
     sender.pass_time(2.0)
@@ -166,7 +166,7 @@ def test_watch_on_sent_topic_receives_its_newest_message(played, whole):
     sender.source.pop_results()
     sender.source.watch("/a")
     sender.source.process()
-    shown = sender.source.pop_results().drain_result.batches["/a"].messages
+    shown = sender.source.pop_results().batches["/a"].messages
     assert [kept(each) for each in shown] == [sender.taken()[-1]]
 
 

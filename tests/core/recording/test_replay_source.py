@@ -98,7 +98,7 @@ def replay(path):
 
 
 def of(handed: ReplayResults, topic: str) -> list[Message]:
-    batch = handed.drain_result.batches.get(topic)
+    batch = handed.batches.get(topic)
     return batch.messages if batch is not None else []
 
 
@@ -133,7 +133,7 @@ def test_seek_delivers_newest_message_of_each_topic_up_to_playhead(replay, whole
         expected = {topic: newest(whole, topic, at_ns) for topic in topics}
         assert found == {topic: each for topic, each in expected.items() if each is not None}
         assert ("/camera" in played.pictures.shown) == (expected["/camera"] is not None)
-        assert handed.drain_result.batches == {}
+        assert handed.batches == {}
 
 
 def test_seek_discards_undelivered_messages(replay, whole):
@@ -144,7 +144,7 @@ def test_seek_discards_undelivered_messages(replay, whole):
         played.clock.now += 0.01
     handed = played.do(lambda playback: playback.seek(whole[0][0]))
     assert [each.seq for each in handed.seek_messages] == [0]
-    assert handed.drain_result.batches == {}
+    assert handed.batches == {}
 
 
 def test_seek_is_clamped_to_the_recording(replay, whole):
@@ -231,7 +231,7 @@ def test_slow_window_drops_and_counts_messages_while_playhead_stays_correct(tmp_
     played.source.pop_results()
     played.do(Playback.play)
     handed = played.pass_time(5.0)
-    batch = handed.drain_result.batches["/a"]
+    batch = handed.batches["/a"]
     assert (len(batch.messages), batch.arrived_count) == (MAX_MESSAGES_PER_TOPIC, count - 1)
     assert batch.messages[-1].seq == count - 1
     assert played.source.status.player.position_ns == played.source.opened_recording.recording.end_ns

@@ -300,11 +300,11 @@ class Replay(World):
         if results.seek_messages is not None:
             self._apply_seek(results.seek_messages)
         self._apply_history(results)
-        for topic, batch in results.drain_result.batches.items():
+        for topic, batch in results.batches.items():
             if topic in LOG_TOPICS:
                 self.console.add_messages(batch.messages, batch.dropped)
             self.add(topic, batch)
-        self.series.dispatch(results.drain_result.batches)
+        self.series.dispatch(results.batches)
         if results.stats:
             self.topics.set_stats({name: (x.rate_hz, x.newest_ns) for name, x in results.stats.items()})
         self.topics.update_ages(self._clock(), self._position_ns())

@@ -9,14 +9,14 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
 from typing import Literal, Protocol
 
 from app.core.faults import error_text
-from app.core.network.mailbox import DrainResult, Mailbox
+from app.core.network.mailbox import Batch, Mailbox
 from app.core.recording.opener import LocalOpener, RecordingOpener
 from app.core.recording.replay.opening import OpenedRecording, open_recording
 from nep.errors import NepError, RecordingError
@@ -99,13 +99,13 @@ class ReplayResults:
     Attributes:
         seek_messages: Newest message of each topic after a seek; None if there was no seek.
         history: Earlier messages of topics with history, by topic.
-        drain_result: Messages played after that.
+        batches: Messages played after that, by topic.
         stats: Statistics by topic.
     """
 
     seek_messages: Sequence[Message] | None = None
     history: dict[str, Sequence[Message]] = field(default_factory=dict)
-    drain_result: DrainResult = field(default_factory=lambda: DrainResult({}, [], 0))
+    batches: Mapping[str, Batch] = field(default_factory=dict)
     stats: dict[str, ReplayStats] = field(default_factory=dict)
 
 
@@ -219,7 +219,7 @@ class ReplaySource:
         """Return and clear the results collected since the last call."""
         with self._changed:
             results, self._results = self._results, ReplayResults()
-            results.drain_result = self._mailbox.drain()
+            results.batches = self._mailbox.drain()
         return results
 
     def request_stop(self) -> None:
