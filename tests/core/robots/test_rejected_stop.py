@@ -57,9 +57,12 @@ def arm(master: Master) -> Iterator[Driver]:
 
 def the_link(session: Session, name: str = "Arm") -> RobotLink:
     def ready() -> bool:
-        return session.stopper is not None and name in session.stopper.robots
+        """Whether Stop knows the robot, and the robot has sent its first heartbeat."""
+        link = session.fleet.link(name)
+        known = session.stopper is not None and name in session.stopper.robots
+        return known and link is not None and link.state == "ready"
 
-    tick_until(session, ready)
+    tick_until(session, ready, LONG_S)
     link = session.fleet.link(name)
     assert link is not None
     return link
