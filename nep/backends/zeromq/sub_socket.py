@@ -19,7 +19,7 @@ from nep.backends.bases.loss import PublisherTracker, TrackedPublisher
 from nep.backends.bases.message_parser import MIN_VIEW_BYTES, SHARED_FORM, MessageBuffer, MessageParser
 from nep.backends.bases.rejections import RejectionCounter
 from nep.backends.zeromq.byte_window import WINDOW_BYTES
-from nep.backends.zeromq.shared.payloads import SharedSources
+from nep.backends.zeromq.shared.payloads import REFERENCE_BYTES, SharedSources
 from nep.backends.zeromq.sockets import (
     Socket,
     enable_keep_alive,
@@ -334,6 +334,7 @@ class SubSocket:
             or source.last != seq - 1
             or source.shared_form != form
             or len(first) != self._payload_offset + size
+            or size != REFERENCE_BYTES
         ):
             return None
         data = self._shared.read(

@@ -524,6 +524,25 @@ def test_invalid_reference_is_rejected_and_missing_payload_is_counted_as_lost(
         context.term()
 
 
+def test_truncated_reference_of_a_reading_publisher_is_rejected(node: nep.Node) -> None:
+    sub, pub = node.new_sub("t", "bytes"), node.new_pub("t", "bytes")
+    for _ in range(begin(pub)):
+        assert sub.receive(LONG_S) is not None
+    pub.publish(bytes(LARGE))
+    assert sub.receive(LONG_S) is not None
+    transport = pub._transport
+    assert isinstance(transport, NativePublisher)
+    for reference in (b"", b"1234567", b"123456789"):
+        form = transport._form | wire.SHARED << 16
+        header = wire.pack_header(form, len(reference), pub.count + 1, 5, pub.id)
+        transport._send(wire.topic_part("t") + header + reference)
+    pub.publish(b"next")
+    message = sub.receive(LONG_S)
+    assert message is not None
+    assert message.payload == b"next"
+    assert sub.refused == 3
+
+
 def test_opening_missing_memory_raises_lookup_error() -> None:
     with pytest.raises(LookupError):
         SharedReader(next(_ids), 1)

@@ -14,6 +14,8 @@ from nep.i18n import _
 from nep.protocol.wire import OfferAcceptance
 
 _NUMBER = struct.Struct("<Q")
+REFERENCE_BYTES = _NUMBER.size
+"""Size in bytes of the part of a message that refers to a payload."""
 _MAX_OFFERS = 4
 """Maximum number of offers to a subscriber. A subscriber that doesn't confirm any can't share memory."""
 _OFFER_RETRY_S = 0.5
@@ -151,7 +153,7 @@ class SharedSources:
             WireError: The part is malformed.
         """
         reader = self._readers.get(publisher)
-        if len(part) != _NUMBER.size:
+        if len(part) != REFERENCE_BYTES:
             raise WireError(
                 _("the message doesn't refer to a payload in shared memory"), len(part), code="shared-memory"
             )
