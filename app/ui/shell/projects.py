@@ -44,7 +44,7 @@ class ProjectController:
         dialogs: FileDialogs,
         show_toast: Callable[..., object],
         show_editor: Callable[[], object],
-        flush: Callable[[Callable[[], None]], object],
+        flush: Callable[[Callable[[], None]], None],
         show_current: Callable[[], object],
     ) -> None:
         self._session, self.dialogs, self._show_toast, self._show_editor = (
@@ -62,7 +62,7 @@ class ProjectController:
 
     def new(self) -> None:
         """Create an empty behaviour in a new tab."""
-        self.run_after_flush(lambda: self._open_tab(self._documents.new))
+        self._flush(lambda: self._open_tab(self._documents.new))
 
     def ask_open(self) -> None:
         """Ask for a behaviour file and open it."""
@@ -72,7 +72,7 @@ class ProjectController:
 
     def open(self, path: Path) -> None:
         """Open a behaviour file in a tab; an error is shown as an alert."""
-        self.run_after_flush(lambda: self._open_tab(lambda: self._session.files.open(path)))
+        self._flush(lambda: self._open_tab(lambda: self._session.files.open(path)))
 
     def open_all(self, paths: Sequence[Path]) -> None:
         """Open files from the command line, from a drop, or from a later start of Studio.
@@ -95,7 +95,7 @@ class ProjectController:
 
     def open_example(self, path: Path) -> None:
         """Open a copy of an example in a new tab."""
-        self.run_after_flush(lambda: self._open_tab(lambda: self._documents.open_example(path)))
+        self._flush(lambda: self._open_tab(lambda: self._documents.open_example(path)))
 
     def copy(self, path: Path, name: str) -> None:
         """Open a copy of a saved version in a new tab, without writing a file.
@@ -109,11 +109,11 @@ class ProjectController:
             self._documents.copy(path, name)
             self._show_toast(_("Opened {name} as a copy").format(name=name))
 
-        self.run_after_flush(lambda: self._open_tab(open_copy))
+        self._flush(lambda: self._open_tab(open_copy))
 
     def recover(self, unsaved: Sequence[UnsavedWork]) -> None:
         """Open behaviours with unsaved changes in tabs, and show the most recently used one."""
-        self.run_after_flush(lambda: self._open_tab(lambda: self._session.tabs.recover(unsaved)))
+        self._flush(lambda: self._open_tab(lambda: self._session.tabs.recover(unsaved)))
 
     def close(self, *documents: OpenProject) -> None:
         """Close the tabs of documents, stopping their programs.
@@ -136,7 +136,7 @@ class ProjectController:
                     self._report_save_error(error)
             self._notify_closed([each for each in closed_projects if each.is_saved])
 
-        self.run_after_flush(close_documents)
+        self._flush(close_documents)
 
     def reopen(self) -> None:
         """Reopen the most recently closed tab."""
@@ -145,7 +145,7 @@ class ProjectController:
             if self._documents.reopen() is None:
                 self._show_toast(_("No closed tabs"))
 
-        self.run_after_flush(lambda: self._open_tab(reopen_document))
+        self._flush(lambda: self._open_tab(reopen_document))
 
     def show(self, document: OpenProject) -> None:
         """Show the tab of a document, without waiting for the next tick."""
@@ -154,7 +154,7 @@ class ProjectController:
 
     def duplicate(self, document: OpenProject) -> None:
         """Open a copy of a document in a new tab."""
-        self.run_after_flush(lambda: self._open_tab(lambda: self._documents.duplicate(document)))
+        self._flush(lambda: self._open_tab(lambda: self._documents.duplicate(document)))
 
     def rename(self, document: OpenProject, name: str) -> bool:
         """Rename a behaviour and its file; return False on failure, which is shown as an alert.
@@ -183,7 +183,7 @@ class ProjectController:
         if self._session.document.path is None:
             self.save_as()
         else:
-            self.run_after_flush(lambda: self._save(None))
+            self._flush(lambda: self._save(None))
 
     def save_as(self) -> None:
         """Ask for a file and save the current behaviour to it."""
@@ -195,7 +195,7 @@ class ProjectController:
             else Path.home()
         )
         suggestion = str(folder / f"{document.name}{SUFFIX}")
-        self.dialogs.save(suggestion, lambda path: self.run_after_flush(lambda: self._save(path)))
+        self.dialogs.save(suggestion, lambda path: self._flush(lambda: self._save(path)))
 
     def fix(self, action: BlockFix) -> bool:
         """Apply a fix to the blocks of the current behaviour; return False if that isn't possible."""
@@ -206,12 +206,8 @@ class ProjectController:
         def apply_fix() -> None:
             document.fix(action)
 
-        self.run_after_flush(apply_fix)
+        self._flush(apply_fix)
         return True
-
-    def run_after_flush(self, callback: Callable[[], None]) -> None:
-        """Call a function after the pending edit of the block editor was applied to the document."""
-        self._flush(callback)
 
     def _save(self, path: Path | None) -> None:
         document = self._session.document

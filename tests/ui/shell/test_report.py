@@ -274,7 +274,7 @@ def test_checking_for_a_new_version_only_opens_the_releases_page(
 ) -> None:
     opened.works = works
     said: list[str] = []
-    monkey = ReportCommands(window, session, window.commands.files, answers)
+    monkey = ReportCommands(window, session, answers)
     window.toast.show_toast = lambda words, *_more: said.append(words)  # type: ignore[method-assign]
     monkey.open_releases_page("https://example.org/releases")
     assert opened.urls == ["https://example.org/releases"]

@@ -59,7 +59,7 @@ class BehaviourCommands:
         if runs.view().state == "paused":
             runs.resume()
         else:
-            self._files.run_after_flush(partial(self._replace_run, runs.run))
+            self._shell.flush(partial(self._replace_run, runs.run))
 
     def _replace_run(self, start: Callable[[], object]) -> None:
         # Shows a toast with the name of the behaviour that was stopped by this run.
@@ -102,21 +102,21 @@ class BehaviourCommands:
             if session.documents.title(session.document) == name:
                 session.runs.run()
 
-        self._files.run_after_flush(start)
+        self._shell.flush(start)
         return ""
 
     def try_stack(self, stack: Stack) -> None:
         """Run a single script, after the newest edit of the block editor was applied."""
         run_stack = partial(self._session.runs.try_stack, stack)
-        self._files.run_after_flush(partial(self._replace_run, run_stack))
+        self._shell.flush(partial(self._replace_run, run_stack))
 
     def restart(self) -> None:
         """Restart the running behaviour, after the newest edit of the block editor was applied."""
-        self._files.run_after_flush(self._session.runs.restart)
+        self._shell.flush(self._session.runs.restart)
 
     def run_step(self) -> None:
         """Run the next block, after the newest edit of the block editor was applied."""
-        self._files.run_after_flush(self._session.runs.step)
+        self._shell.flush(self._session.runs.step)
 
     def start_demo(self) -> None:
         """Start the virtual Pepper and open the first example."""
@@ -206,7 +206,7 @@ class BehaviourCommands:
 
     def show_earlier_versions(self) -> None:
         """Open the version history of the current behaviour, after its newest edit was applied."""
-        self._files.run_after_flush(self._show_versions)
+        self._shell.flush(self._show_versions)
 
     def _show_versions(self) -> None:
         if self._version_sheet is None:

@@ -43,7 +43,7 @@ class Commands:
         )  # fmt: skip
         self.behaviours = BehaviourCommands(shell, session, self.files)
         session.alarms.run_behaviour = self.behaviours.run_named
-        self.robots = RobotCommands(shell, session, self.files)
+        self.robots = RobotCommands(shell, session)
         self.view = ViewCommands(shell, session, self.files, shortcuts)
         self.shortcuts = shortcuts
         self.recording = RecordCommands(shell, session, dialogs)
@@ -58,7 +58,7 @@ class Commands:
             self.robots,
             self.view,
             EditCommands(shell),
-            ReportCommands(shell, session, self.files, dialogs),
+            ReportCommands(shell, session, dialogs),
             self.recording,
             self.replay,
         )

@@ -15,7 +15,6 @@ from app.core.reports.crash_reports import ALERT_ID
 from app.core.session import Session
 from app.ui.other_programs import open_externally
 from app.ui.shell.commands.shell import Shell
-from app.ui.shell.projects import ProjectController
 from app.ui.widgets.file_dialogs import FileDialogs
 from nep.i18n import _
 from nep.system.lazy_import import lazy_module
@@ -41,12 +40,11 @@ class ReportCommands:
         self,
         shell: Shell,
         session: Session,
-        files: ProjectController,
         dialogs: FileDialogs,
         clock: Callable[[], float] = time.time,
     ) -> None:
         # `clock` returns seconds since 1970.
-        self._shell, self._session, self._files, self._dialogs = shell, session, files, dialogs
+        self._shell, self._session, self._dialogs = shell, session, dialogs
         self._clock = clock
         self._sheet: report_sheet.ReportSheet | None = None
 
@@ -59,7 +57,7 @@ class ReportCommands:
         doctor = self._session.doctor
         if doctor.finished_s is None or self._clock() - doctor.finished_s > DOCTOR_MAX_AGE_S:
             doctor.start()
-        self._files.run_after_flush(self._open)
+        self._shell.flush(self._open)
 
     def _open(self) -> None:
         shell, session = self._shell, self._session

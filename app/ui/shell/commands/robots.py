@@ -11,7 +11,6 @@ from app.intents import ReplaceRobot
 from app.robots.virtual_models import VirtualModel, virtual_models
 from app.ui.intents import Undo
 from app.ui.shell.commands.shell import Shell
-from app.ui.shell.projects import ProjectController
 from nep.i18n import _
 from nep.system.lazy_import import lazy_module
 
@@ -26,8 +25,8 @@ else:  # imported after the window is shown
 class RobotCommands:
     """Handlers of the commands for robots and for access to the network."""
 
-    def __init__(self, shell: Shell, session: Session, files: ProjectController) -> None:
-        self._shell, self._session, self._files = shell, session, files
+    def __init__(self, shell: Shell, session: Session) -> None:
+        self._shell, self._session = shell, session
         self._network_access: network_access.NetworkAccessSheet | None = None
         self._other_networks: other_networks.OtherNetworksSheet | None = None
         self._web_pages: web_pages.WebPagesSheet | None = None
@@ -129,7 +128,7 @@ class RobotCommands:
                 message = message.format(robot=swap.replacement, other=swap.missing)
                 self._shell.show_toast(message, _("Undo"), lambda: self._shell.request(Undo()))
 
-        self._files.run_after_flush(replace)
+        self._shell.flush(replace)
         return True
 
     def revoke_motion_permissions(self) -> None:
