@@ -70,12 +70,19 @@ class Journal:
         """Name of the journal file."""
         return self._file.name
 
-    def write(self, project: Project, path: Path | None) -> None:
-        """Write the current state to disk, so that it survives a crash of this process. Raises OSError.
+    def write(self, project: Project, path: Path | None) -> Path:
+        """Write the current state to disk, so that it survives a crash of this process.
 
         Args:
             project: Content, whose workspaces are written unchanged if they come from the editor.
             path: File of the project, or None.
+
+        Returns:
+            Path of the journal.
+
+        Raises:
+            OSError: The journal can't be written.
+            RecursionError: The content is nested too deeply.
         """
         entry = {
             "format": format_version(project),
@@ -95,6 +102,7 @@ class Journal:
             texts["pages"] = f"[{', '.join(pages)}]"
         data = _joined(entry, texts).encode("utf-8", "surrogatepass")
         write_atomically(self._file, data, durable=False, private=True)
+        return self._file
 
     def discard(self) -> None:
         """Delete the journal after the work was saved or discarded.

@@ -128,7 +128,7 @@ class OpenProject:
         self._compile_s: float | None = None
         self._compiling_key: Key | None = None
         self.compiler: BackgroundWorker[CompiledProgram] | None = None
-        self.journal_writer: BackgroundWorker[bool] | None = None
+        self.journal_writer: BackgroundWorker[Path] | None = None
         self._definitions: tuple[int, Mapping[str, object]] | None = None
         self._journal_error: str | None = None
 
@@ -513,16 +513,16 @@ class OpenProject:
         self.definitions_revision += 1
 
     def _write_journal(self) -> None:
-        write_job = partial(_write_entry, self._journal, self.project, self.path)
+        write_job = partial(self._journal.write, self.project, self.path)
         if self.journal_writer is not None:
             self.journal_writer.submit(self._journal.name, write_job)
         else:
             self._apply_journal_result(write_job)
 
-    def _apply_journal_result(self, take_result: Callable[[], bool | None]) -> None:
+    def _apply_journal_result(self, take_result: Callable[[], Path | None]) -> None:
         # Applies the result of writing the journal; None means not finished.
         try:
-            is_written = take_result()
+            written_path = take_result()
         except OSError as error:
             self._journal_error = _("can't back up unsaved work ({reason}); save the file now").format(
                 reason=error.strerror or error
@@ -532,7 +532,7 @@ class OpenProject:
                 reason=_(TOO_DEEP_MESSAGE), advice=_(SPLIT_ADVICE)
             )
         else:
-            self._journal_error = None if is_written else self._journal_error
+            self._journal_error = None if written_path is not None else self._journal_error
 
     def _discard_journal(self) -> None:
         if self.journal_writer is not None:
@@ -565,11 +565,6 @@ class OpenProject:
                 previous if previous and is_known else (description, _parse_robot(description))
             )
         return [robot for _description, robot in self._parsed_robots.values() if robot is not None]
-
-
-def _write_entry(journal: Journal, project: Project, path: Path | None) -> bool:
-    journal.write(project, path)
-    return True
 
 
 def _compile_timed(

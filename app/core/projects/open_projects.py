@@ -41,7 +41,7 @@ class OpenProjects:
         self._closed_paths: list[Path] = []
         self._compiler: BackgroundWorker[CompiledProgram] = BackgroundWorker("studio-compiler")
         # a separate worker, so that unsaved work never waits for a long compilation
-        self._journal_writer: BackgroundWorker[bool] = BackgroundWorker("studio-journal")
+        self._journal_writer: BackgroundWorker[Path] = BackgroundWorker("studio-journal")
         self.revision = 0
         self.current = self._new_document()
         self._documents = [self.current]

@@ -33,14 +33,14 @@ def journals(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def journal_writer() -> Iterator[BackgroundWorker[bool]]:
-    made: BackgroundWorker[bool] = BackgroundWorker("test journal")
+def journal_writer() -> Iterator[BackgroundWorker[Path]]:
+    made: BackgroundWorker[Path] = BackgroundWorker("test journal")
     yield made
     made.close()
 
 
 @pytest.fixture(params=["written at once", "written beside the window"])
-def document(request, journals: Path, journal_writer: BackgroundWorker[bool]) -> OpenProject:
+def document(request, journals: Path, journal_writer: BackgroundWorker[Path]) -> OpenProject:
     made = OpenProject(lambda: Journal(journals), clock=lambda: 5.0)
     if request.param == "written beside the window":
         made.journal_writer = journal_writer
@@ -54,11 +54,12 @@ class SlowJournal(Journal):
         super().__init__(folder)
         self.began, self.goes, self.wrote = threading.Event(), threading.Event(), 0
 
-    def write(self, *arguments, **named) -> None:
+    def write(self, *arguments, **named) -> Path:
         self.began.set()
         assert self.goes.wait(60)
-        super().write(*arguments, **named)
+        path = super().write(*arguments, **named)
         self.wrote += 1
+        return path
 
 
 @pytest.fixture
@@ -67,7 +68,7 @@ def slow(journals: Path) -> SlowJournal:
 
 
 @pytest.fixture
-def on_a_slow_disk(slow: SlowJournal, journal_writer: BackgroundWorker[bool]) -> Iterator[OpenProject]:
+def on_a_slow_disk(slow: SlowJournal, journal_writer: BackgroundWorker[Path]) -> Iterator[OpenProject]:
     document = OpenProject(lambda: slow)
     document.journal_writer = journal_writer
     yield document
@@ -95,7 +96,7 @@ def test_slow_disk_does_not_block_and_newest_edit_is_journalled(
 def test_journal_is_deleted_when_its_document_is_replaced_closed_or_saved_during_a_write(
     on_a_slow_disk: OpenProject,
     slow: SlowJournal,
-    journal_writer: BackgroundWorker[bool],
+    journal_writer: BackgroundWorker[Path],
     tmp_path: Path,
     journals: Path,
     end: Callable[[OpenProject], object],

@@ -31,8 +31,9 @@ class Journal(journal_module.Journal):
         super().__init__(Path("no such folder"))
         self.kept: str | None = None
 
-    def write(self, project: Project, path: Path | None) -> None:
+    def write(self, project: Project, path: Path | None) -> Path:
         self.kept = project.always.workspace.text
+        return Path(self.name)
 
     def discard(self) -> None:
         self.kept = None
