@@ -238,7 +238,7 @@ class Run:
         """Run the program until it ends, then stop the robots; return True if no block failed."""
         with nep.node(f"program {self._program.name}"[:100], master=self._master) as node:
             self._out.on_print = partial(node.log.info, "%s")
-            silent_robots = self._run_with_node(node)
+            silent_robots = self._run_scripts(self._connect(node))
             error = self._runtime.error
             self._runtime.scheduler.record_stop()
             self._send_trace()
@@ -255,7 +255,7 @@ class Run:
             node.close(FLUSH_TIMEOUT_S if self._stop_timeout_s == 0.0 else 2 * STOP_TIMEOUT_S)
         return error is None
 
-    def _run_with_node(self, node: nep.Node) -> tuple[str, ...]:
+    def _connect(self, node: nep.Node) -> Network:
         network = Network(
             node,
             self._id,
@@ -270,8 +270,19 @@ class Run:
         self._network = network
         if self._starts_paused:
             network.pause_robots()
+        return network
+
+    def _run_scripts(self, network: Network) -> tuple[str, ...]:
+        # Returns the robots that haven't confirmed their stop; none if the program was stopped by the user.
         try:
-            self._start_scripts(network)
+            names = self._runtime.namespace() | {"step": partial(self._step, network)}
+            if self._program.shows_value:
+                names["write"] = self._runtime.show
+            self._variables = VariableWatch(names, self._program.variables)
+            code = compile(self._program.runnable, "<behaviour>", "exec")
+            exec(code, names)  # noqa: S102 (the compiler's own tree: texts of files are literals only)
+            self._started_at = time.monotonic()
+            self._runtime.start(network, self._robots)
             self._report_until_finished()
         finally:
             self._runtime.scheduler.stop()
@@ -279,26 +290,17 @@ class Run:
             network.close()
         return silent_robots if self._stop_timeout_s is None else ()
 
-    def _start_scripts(self, network: Network) -> None:
-        names = self._runtime.namespace() | {"step": partial(self._step, network)}
-        if self._program.shows_value:
-            names["write"] = self._runtime.show
-        self._variables = VariableWatch(names, self._program.variables)
-        code = compile(self._program.runnable, "<behaviour>", "exec")
-        exec(code, names)  # noqa: S102 (the compiler's own tree: texts of files are literals only)
-        self._started_at = time.monotonic()
-        self._runtime.start(network, self._robots)
-
     def _step(self, network: Network, block: str) -> None:
         # With a pace, robots must not keep driving while the block waits. Before a breakpoint
         # everything is paused.
-        if block in self._breakpoints and not self._runtime.scheduler.is_paused:
+        scheduler = self._runtime.scheduler
+        if block in self._breakpoints and not scheduler.is_paused:
             self.pause()
-        if self._runtime.scheduler.pace_s:
+        if scheduler.pace_s:
             with network.suspend_motions():
-                self._runtime.step(block)
+                scheduler.step(block)
         else:
-            self._runtime.step(block)
+            scheduler.step(block)
 
     def set_breakpoints(self, command: Mapping[str, object]) -> None:
         """Replace the breakpoints; command "breakpoints"."""

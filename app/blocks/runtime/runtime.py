@@ -28,7 +28,7 @@ from nep.i18n import _, lazy, translate
 
 _METHOD_NAMES = (
     "answer", "ask", "ask_with_choices", "broadcast", "broadcast_and_wait", "called", "fail", "newest",
-    "number", "on_broadcast", "on_message", "on_start", "on_true", "publish", "reset_timer", "robot", "step",
+    "number", "on_broadcast", "on_message", "on_start", "on_true", "publish", "reset_timer", "robot",
     "stop_others", "stop_program", "timer", "value", "wait", "wait_until", "write",
 )  # fmt: skip
 _VALUE_NAMES = (
@@ -141,7 +141,7 @@ class Runtime:
             {name: getattr(self, name) for name in _METHOD_NAMES}
             | {name: getattr(values, name) for name in _VALUE_NAMES}
             | {name: getattr(part, name) for part in _FUNCTION_MODULES for name in part.__all__}
-            | {"stop_script": stop_script}
+            | {"step": self.scheduler.step, "stop_script": stop_script}
         )
 
     # ---- start and end
@@ -165,36 +165,31 @@ class Runtime:
         if not self._running:
             self.finished.set()
         with self.scheduler.defer_turns():
-            self._start_scripts()
+            for receiver in self._broadcasts.receivers:
+                # Not counted: without other running scripts, it can't receive a broadcast any more.
+                self.scheduler.start(
+                    receiver.name, self._with_error_reporting(partial(receiver.serve, self.scheduler))
+                )
+            for script in self._starts:
+                body = self._with_error_reporting(
+                    partial(self._run_once, script), on_end=self._remove_running
+                )
+                self.scheduler.start(script.__name__, body, idle=False)
+            for trigger, script in self._triggers:
+                body = self._with_error_reporting(
+                    partial(self._run_for_events, trigger, script), on_end=self._remove_running
+                )
+                self.scheduler.start(script.__name__, body)
 
-    def _start_scripts(self) -> None:
-        for receiver in self._broadcasts.receivers:
-            # Not counted: without other running scripts, it can't receive a broadcast any more.
-            self.scheduler.start(
-                receiver.name, self._with_error_reporting(partial(receiver.serve, self.scheduler))
-            )
-        for script in self._starts:
-            body = self._with_error_reporting(partial(self._run_once, script), on_end=self._remove_running)
-            self.scheduler.start(script.__name__, body, idle=False)
-        for trigger, script in self._triggers:
-            body = self._with_error_reporting(
-                partial(self._run_for_events, trigger, script), on_end=self._remove_running
-            )
-            self.scheduler.start(script.__name__, body)
-
-    def _run_once(self, script: Script) -> None:
+    def _run_once(self, script: Script, *arguments: object) -> None:
         with suppress(EndScript):
             self.scheduler.start_run()
-            script()
+            script(*arguments)
         self.scheduler.finish_run()
 
     def _run_for_events(self, trigger: ScriptTrigger, script: Script) -> None:
         while True:
-            arguments = trigger.next(self.scheduler)
-            with suppress(EndScript):
-                self.scheduler.start_run()
-                script(*arguments)
-            self.scheduler.finish_run()
+            self._run_once(script, *trigger.next(self.scheduler))
             if trigger.dropped_count:
                 self.write(
                     _("“{title}” couldn't keep up: {dropped} of its events were skipped").format(
@@ -296,10 +291,6 @@ class Runtime:
         self.scheduler.end_other_runs()
 
     # ---- blocks
-
-    def step(self, block: str) -> None:
-        """Record that the calling script has reached a block; see `Scheduler.step`."""
-        self.scheduler.step(block)
 
     def value(self, block: str, compute: Callable[[], object]) -> object:
         """Compute and return the result of a value block; exceptions are converted to errors of the block.

@@ -518,7 +518,16 @@ class Runs:
                 return  # the window asks the user first
             self._fleet.return_to_start(program.robots if request.stack is None else ())
             owners = owners_of(self._fleet)
-            runner = self._start_runner(program, document.name, request, owners)
+            runner = self._create_runner(self._post_event)
+            runner.start(
+                program,
+                [link.robot.source for link in self._fleet.connected],
+                self._network.address,
+                name=document.name,
+                paused=request.starts_paused,
+                pace_s=self.pace_s,
+                owners=owners,
+            )
         except AppError as error:
             self._alerts.raise_alert("program", "error", _("The behaviour can't be started."), str(error))
             return
@@ -533,21 +542,6 @@ class Runs:
         self._console.ignore_process(runner.pid)
         self._edits.set_program(document if request.stack is None else None, program)
         self._show_start(self._documents.title(document), self._trial.start(program, robots))
-
-    def _start_runner(
-        self, program: Program, name: str, request: RequestedRun, owners: Mapping[str, str]
-    ) -> Runner:
-        runner = self._create_runner(self._post_event)
-        runner.start(
-            program,
-            [link.robot.source for link in self._fleet.connected],
-            self._network.address,
-            name=name,
-            paused=request.starts_paused,
-            pace_s=self.pace_s,
-            owners=owners,
-        )
-        return runner
 
     def _show_start(self, title: str, tried_label: str) -> None:
         run, previous = RunState("running", title, is_started=False, tried_label=tried_label), self._run
