@@ -227,17 +227,38 @@ class RobotHandle:
         self._name = name
         self._runtime = runtime
 
-    def do(self, action: str, /, **input: object) -> None:
-        """Run an action and wait until it has ended.
+    def do(self, name: str, /, **arguments: object) -> RobotCall:
+        """Run an action, wait until it has ended, and return its call.
 
         Args:
-            action: Name of the action.
-            input: Parameters of the action.
+            name: Name of the action.
+            arguments: Parameters of the action.
 
         Raises:
             BehaviourError: The robot can't execute the action; the message is for the user.
         """
-        self._invoke(action, input)
+        robot = self._runtime.robot_description(self._name)
+        action = robot.action(name)
+        if action is None:
+            raise BehaviourError(_("{name} can't “{name_2}”.").format(name=self._name, name_2=name))
+        input = {key: _convert_input(action, key, value) for key, value in arguments.items()}
+        problems = action.check(action.complete(input))
+        if problems:
+            raise BehaviourError(
+                _("{name} can't do this: {wrong}.").format(name=self._name, wrong=problems[0])
+            )
+        activity = activity_text(robot, action, input)
+        self._runtime.status_text.set_text(activity)
+        try:
+            call = self._run_action(robot, action, action.complete(input), activity)
+        finally:
+            self._runtime.status_text.set_text("")
+        if call.state == "failed":
+            reason = call.error or _("“{action}” failed").format(action=action.title)
+            raise BehaviourError(
+                _with_full_stop(_("{robot}: {what_it_said}").format(robot=self._name, what_it_said=reason))
+            )
+        return call
 
     def ask(self, action: str, field: str, /, **input: object) -> object:
         """Run an action and return one field of its result; None if the result doesn't have the field.
@@ -250,7 +271,7 @@ class RobotHandle:
         Raises:
             BehaviourError: The robot can't execute the action; the message is for the user.
         """
-        return self._invoke(action, input).output.get(field)
+        return self.do(action, **input).output.get(field)
 
     def get(self, sensor: str, field: str | None = None) -> object:
         """Return the newest value of a sensor, or one field of the value; None if the value is unknown.
@@ -298,30 +319,6 @@ class RobotHandle:
             limit: Limit in the unit of the sensor.
         """
         return self._runtime.on_pass(self._name, sensor, side, limit)
-
-    def _invoke(self, name: str, arguments: Mapping[str, object]) -> RobotCall:
-        robot = self._runtime.robot_description(self._name)
-        action = robot.action(name)
-        if action is None:
-            raise BehaviourError(_("{name} can't “{name_2}”.").format(name=self._name, name_2=name))
-        input = {key: _convert_input(action, key, value) for key, value in arguments.items()}
-        problems = action.check(action.complete(input))
-        if problems:
-            raise BehaviourError(
-                _("{name} can't do this: {wrong}.").format(name=self._name, wrong=problems[0])
-            )
-        activity = activity_text(robot, action, input)
-        self._runtime.status_text.set_text(activity)
-        try:
-            call = self._run_action(robot, action, action.complete(input), activity)
-        finally:
-            self._runtime.status_text.set_text("")
-        if call.state == "failed":
-            reason = call.error or _("“{action}” failed").format(action=action.title)
-            raise BehaviourError(
-                _with_full_stop(_("{robot}: {what_it_said}").format(robot=self._name, what_it_said=reason))
-            )
-        return call
 
     def _run_action(
         self, robot: Robot, action: Action, input: Mapping[str, object], activity: str
