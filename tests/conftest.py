@@ -39,6 +39,7 @@ os.environ["NEP_LANG"] = "en"  # tests compare English texts, whatever the syste
 _GRACE_S = 20.0
 _GRACE_AFTER_LEAK_S = 1.0
 _PAST_TIMEOUT_S = 60.0
+PATIENCE_S = 30.0
 _SKIPPED = "skipped_groups"
 _selection = pytest.StashKey[tuple[tuple[str, ...], str | None]]()
 _allowances = leftovers.Allowances()
@@ -185,6 +186,19 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     A test that waits for a handshake to time out needs this time.
     """
     monkeypatch.setattr("nep.backends.zeromq.transport.HANDSHAKE_TIMEOUT_S", GREETINGS_S)
+
+
+@pytest.fixture
+def patient_robots(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Extend the time limits for replies of robots in this process, so that a busy computer doesn't exceed them.
+
+    A test whose robot doesn't reply shortens them again (`tests.blocks.wire_robot.usual_time_limits`).
+    """
+    limits = "app.robots.client.limits."
+    for name in ("STOP_TIMEOUT_S", "MAX_STOP_TIMEOUT_S", "FIRST_REPLY_TIMEOUT_S", "MIN_SILENCE_S"):
+        monkeypatch.setattr(limits + name, PATIENCE_S)
+    monkeypatch.setattr("app.core.robots.invocations.FIRST_REPLY_TIMEOUT_S", PATIENCE_S)
+    monkeypatch.setattr("app.robots.driver.tasks.STOP_REPLY_TIMEOUT_S", PATIENCE_S / 2)
 
 
 @pytest.fixture

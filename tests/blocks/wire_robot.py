@@ -3,12 +3,29 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+
+import pytest
 
 import nep
 from app.robots.client import rize
 from app.robots.description.description import Robot
 from tests.blocks.samples import robot
+
+
+@contextmanager
+def usual_time_limits() -> Iterator[None]:
+    """Shorten the time limits for replies of robots in this process, for a robot that doesn't reply.
+
+    They are those of the product, except that other robots get three seconds to confirm a Stop.
+    """
+    limits = "app.robots.client.limits."
+    with pytest.MonkeyPatch.context() as patched:
+        for name, seconds in (("STOP_TIMEOUT_S", 3.0), ("FIRST_REPLY_TIMEOUT_S", 3.0), ("MIN_SILENCE_S", 2.0)):
+            patched.setattr(limits + name, seconds)
+        patched.setattr("app.core.robots.invocations.FIRST_REPLY_TIMEOUT_S", 3.0)
+        yield
 
 
 class WireRobot:
@@ -37,7 +54,11 @@ class WireRobot:
         self._sensors[name].publish(value)
 
     def heard(self, op: str) -> list[Mapping[str, object]]:
-        return [command for command in self.commands if command["op"] == op]
+        """Return the commands of this operation; a Stop that is repeated until it is answered counts once."""
+        found = [command for command in list(self.commands) if command["op"] == op]
+        if op != "stop":
+            return found
+        return list({command["id"]: command for command in reversed(found)}.values())[::-1]
 
     def close(self) -> None:
         self._node.close()

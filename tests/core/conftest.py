@@ -21,12 +21,14 @@ def _own_home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 
 @pytest.fixture
-def session(master: Master, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Session]:
+def session(
+    master: Master, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, patient_robots: None
+) -> Iterator[Session]:
     """Session on the test's own master, with all its files in the test's folder.
 
-    Robots get three seconds to confirm a stop, because a busy computer may need more than the default.
+    Robots get half a minute to reply, because a busy computer may need more than the default; see
+    `tests.blocks.wire_robot.usual_time_limits` for robots that don't reply.
     """
-    monkeypatch.setattr("app.robots.client.limits.STOP_TIMEOUT_S", 3.0)
     monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))
     made = Session(
         Settings(tmp_path),

@@ -76,7 +76,8 @@ def test_session_survives_every_hostile_message(session: Session, evil: nep.Node
                 assert all(isinstance(record, ConsoleRecord) for record in session.console.records)
         node.log.error("an honest record")
         tick_until(session, lambda: any(each.text == "an honest record" for each in session.console.records))
-        tick_until(session, lambda: session.fleet.link("Lamp").publisher)
+        link = session.fleet.link("Lamp")
+        tick_until(session, lambda: link.publisher is not None and link.publisher.subscribers)
         blink = session.fleet.invoke("Lamp", "blink", {})
         tick_until(session, lambda: not blink.is_running)
         assert blink.state == "succeeded"

@@ -20,6 +20,7 @@ from app.errors import RobotInputError, UnknownRobotError
 from app.intents import ConnectRobot
 from app.robots.description.description import thing_description
 from app.robots.kit import Call, Driver, Kind, Link, action, safe_stop
+from tests.blocks.wire_robot import usual_time_limits
 from tests.core.waiting import tick_until
 
 EXAMPLES = Path(__file__).parents[2] / "resources" / "examples"
@@ -212,10 +213,11 @@ def test_virtual_robot_whose_process_ended_needs_no_manual_switch_off(session: S
     session.runs.run()
     tick_until(session, lambda: session.runs.running_blocks)
     session.launcher._robots["Pepper"][0].kill()
-    tick_until(session, lambda: not session.runs.active)
-    tick_until(session, lambda: session.runs.view().can_run)
+    with usual_time_limits():
+        tick_until(session, lambda: not session.runs.active)
+        tick_until(session, lambda: session.runs.view().can_run)
     assert not session.alerts.has("stop")
-    assert session.alerts.has("companion:Pepper")
+    tick_until(session, lambda: session.alerts.has("companion:Pepper"))
     session.launcher.start_virtual_robot("Pepper")
     assert session.launcher.ended_robots == frozenset()
 
@@ -245,10 +247,14 @@ def test_robots_of_a_killed_program_are_stopped(session: Session) -> None:
             os.kill(runner.pid, signal.SIGKILL if os.name == "posix" else signal.SIGTERM)
             tick_until(session, lambda: session.runs.view().state == "proven")
             assert Lamp.made[-1].stops >= 1
-            heard = []
-            while (message := commands.receive(0.0)) is not None:
-                heard.append(message.payload)
-            stops = [command for command in heard if command["op"] == "stop"]
+            stops = []
+
+            def has_stop() -> bool:
+                while (message := commands.receive(0.0)) is not None:
+                    stops.extend([message.payload] if message.payload["op"] == "stop" else [])
+                return bool(stops)
+
+            tick_until(session, has_stop)  # its own subscriber may lag behind the driver's
             assert {stop["ends"] for stop in stops} == {runner.program_key}
             assert [alert.id for alert in session.alerts.active] == ["program"]
         finally:
@@ -272,7 +278,7 @@ def test_end_of_a_program_stops_only_its_own_robots(session: Session) -> None:
             assert session.runs.view().result.startswith("Lamp stopped")
             assert (used.stops >= 1, other.stops) == (True, 0)
             session.runs.stop_robot("Other")
-            tick_until(session, lambda: other.stops == 1)
+            tick_until(session, lambda: other.stops >= 1)
             link = session.fleet.link("Other")
             tick_until(session, lambda: link is not None and link.last_stop is not None)
         finally:
@@ -285,9 +291,10 @@ def test_unresponsive_robot_is_named_and_run_stays_disabled(session: Session) ->
         description = node.new_pub("/Mute/description", "robot/description", latched=True)
         description.publish(thing_description(LAMP.thing_model, "Mute"))
         tick_until(session, lambda: session.stopper and session.stopper.robots)
-        session.runs.stop()
-        tick_until(session, lambda: session.runs.view().stop_label == "Stopping")
-        tick_until(session, lambda: session.runs.view().state == "unanswered")
+        with usual_time_limits():
+            session.runs.stop()
+            tick_until(session, lambda: session.runs.view().stop_label == "Stopping")
+            tick_until(session, lambda: session.runs.view().state == "unanswered")
         view = session.runs.view()
         assert view.title.startswith("Mute ")
         assert not view.can_run

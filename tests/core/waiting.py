@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 
 from app.core.session import Session
+from tests.blocks.wire_robot import usual_time_limits
 
 
 def tick_until(session: Session, true: Callable[[], object], timeout_s: float = 60.0) -> None:
@@ -18,3 +19,10 @@ def tick_until(session: Session, true: Callable[[], object], timeout_s: float = 
         assert time.monotonic() < end, "it never came true"
         pause.wait(0.01)
         session.tick()
+
+
+def stop_unanswered(session: Session) -> None:
+    """Press Stop and wait until the run bar shows that a robot did not confirm it."""
+    with usual_time_limits():
+        session.runs.stop()
+        tick_until(session, lambda: session.runs.view().state == "unanswered")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, nullcontext
 from typing import ClassVar
 
 import pytest
@@ -14,8 +14,8 @@ from app.core.session import Session
 from app.robots.description.description import Robot
 from nep.masters.master import Master
 from tests.blocks.samples import block, number, started, workspace
-from tests.blocks.wire_robot import WireRobot
-from tests.core.waiting import tick_until
+from tests.blocks.wire_robot import WireRobot, usual_time_limits
+from tests.core.waiting import stop_unanswered, tick_until
 from tests.robots.message_senders import MessageSenderContract, announce, described
 
 
@@ -86,6 +86,7 @@ class Studio:
         self.until(lambda: _subscribers(self.session, "/Pepper/answer") == 2)  # also the stopper's
 
     def invoke(self, action: str, input: Mapping[str, object]) -> Invocation:
+        self.until(lambda: self.link.publisher is not None and self.link.publisher.subscribers)
         return self.session.fleet.invoke("Pepper", action, input)
 
     def runs(self, call: Invocation) -> bool:
@@ -110,9 +111,10 @@ class Studio:
     def value(self, sensor: str) -> object:
         return self.link.values.get(sensor)
 
-    def stop(self, _patience_s: float = 30.0) -> bool:
-        self.session.runs.stop()
-        self.until(lambda: self.session.runs.view().state in {"proven", "unanswered"})
+    def stop(self, patience_s: float = 30.0) -> bool:
+        with usual_time_limits() if patience_s < 30.0 else nullcontext():
+            self.session.runs.stop()
+            self.until(lambda: self.session.runs.view().state in {"proven", "unanswered"})
         return self.session.runs.view().state == "proven"
 
     def stop_says(self) -> str:
@@ -207,10 +209,9 @@ def test_new_program_with_name_of_a_moving_robot_does_not_confirm_its_stop(
     try:
         tick_until(session, lambda: link.is_connected and link.identity != before)
         tick_until(session, lambda: session.stopper is not None and session.stopper.robots)
-        # connect first, because the robot has only one second to reply
+        # connect first, because the robot has only three seconds to reply
         tick_until(session, lambda: thief._answer.subscribers)
-        session.runs.stop()
-        tick_until(session, lambda: session.runs.view().state == "unanswered")
+        stop_unanswered(session)
         assert session.runs.view().title == "Pepper (“Pepper”) didn't reply"
         assert thief.heard("stop")
         session.runs.confirm_stopped()
@@ -225,6 +226,7 @@ def test_new_program_does_not_confirm_stop_of_a_robot_moved_by_hand(
 ) -> None:
     link = the_link(session)
     pepper.slow = {"say"}
+    tick_until(session, lambda: link.publisher is not None and link.publisher.subscribers)
     tried = session.fleet.invoke("Pepper", "say", {"text": "Hi"})
     tick_until(session, lambda: tried.state == "accepted")
     before = link.identity
@@ -234,10 +236,9 @@ def test_new_program_does_not_confirm_stop_of_a_robot_moved_by_hand(
     try:
         tick_until(session, lambda: link.is_connected and link.identity != before)
         tick_until(session, lambda: session.stopper is not None and session.stopper.robots)
-        # connect first, because the robot has only one second to reply
+        # connect first, because the robot has only three seconds to reply
         tick_until(session, lambda: thief._answer.subscribers)
-        session.runs.stop()
-        tick_until(session, lambda: session.runs.view().state == "unanswered")
+        stop_unanswered(session)
         session.runs.confirm_stopped()
         session.tick()
         stop_is_proven(session)
@@ -269,14 +270,14 @@ def test_changed_description_redirects_commands_to_the_new_topic(session: Sessio
     tick_until(session, lambda: link.publisher is not None and link.publisher.subscribers)
     announcement.publish(described("Pepper", command="/Pepper/orders"))
     tick_until(session, lambda: link.publisher is not None and link.publisher.topic == "/Pepper/orders")
+    tick_until(session, lambda: link.publisher is not None and link.publisher.subscribers)
     session.fleet.invoke("Pepper", "say", {"text": "Hi"})
     tick_until(session, lambda: any(command["op"] == "invoke" for command in new))
     assert not any(command["op"] == "invoke" for command in old)
     tick_until(session, lambda: session.stopper is not None and session.stopper.robots)
-    session.runs.stop()  # sent to both topics
+    stop_unanswered(session)  # sent to both topics
     tick_until(session, lambda: any(command["op"] == "stop" for command in old))
     tick_until(session, lambda: any(command["op"] == "stop" for command in new))
-    tick_until(session, lambda: session.runs.view().state == "unanswered")
 
 
 def test_invalid_description_is_reported_and_the_previous_one_stays_valid(

@@ -26,7 +26,8 @@ from tests.core.run.test_runner import Heard
 
 pytestmark = pytest.mark.timeout(240)
 WAY_M = 0.7  # a person stands 0.9 m ahead
-LONG_S = 30.0
+SPEED_M_S = 0.1  # slow, so that the pause takes effect before the end also on a busy computer
+LONG_S = 60.0
 HELD_S = 1.6  # longer than the robot's watchdog timeout (1 s)
 
 
@@ -87,8 +88,8 @@ def node(master) -> Iterator[nep.Node]:
 
 
 def test_pause_interrupts_walk_and_resume_completes_it(master, pepper, node) -> None:
-    (robot,) = find_robots(node, 30, expected=("Pepper",)).robots
-    walk = block("robot_pepper_do_walk", ROBOT="Pepper", DISTANCE=number(WAY_M))
+    (robot,) = find_robots(node, LONG_S, expected=("Pepper",)).robots
+    walk = block("robot_pepper_do_walk", ROBOT="Pepper", DISTANCE=number(WAY_M), SPEED=number(SPEED_M_S))
     program = compile_behaviour(workspace(started(walk)), (robot,), name="Walk")
     assert not program.errors, program.problems
     pose, heard = Pose(node), Heard()
@@ -96,7 +97,7 @@ def test_pause_interrupts_walk_and_resume_completes_it(master, pepper, node) -> 
     runner = Runner(heard)
     try:
         runner.start(program, [robot.source], master.address)
-        pose.until(lambda: pose.far() > 0.2, 30)
+        pose.until(lambda: pose.far() > 0.1, LONG_S)
         runner.pause()
         held = heard.until(ProgramPaused)
         assert held.block, "the block at which it is held"
@@ -114,15 +115,16 @@ def test_pause_interrupts_walk_and_resume_completes_it(master, pepper, node) -> 
 
 
 def test_step_completes_a_paused_action(master, pepper, node) -> None:
-    (robot,) = find_robots(node, 30, expected=("Pepper",)).robots
-    walks = [block("robot_pepper_do_walk", ROBOT="Pepper", DISTANCE=number(0.4)) for _ in range(2)]
+    (robot,) = find_robots(node, LONG_S, expected=("Pepper",)).robots
+    slowly = {"DISTANCE": number(0.4), "SPEED": number(SPEED_M_S)}
+    walks = [block("robot_pepper_do_walk", ROBOT="Pepper", **slowly) for _ in range(2)]
     program = compile_behaviour(workspace(started(*walks)), (robot,), name="Walk")
     pose, heard = Pose(node), Heard()
     pose.until(lambda: bool(pose.seen), LONG_S)
     runner = Runner(heard)
     try:
         runner.start(program, [robot.source], master.address)
-        pose.until(lambda: pose.far() > 0.1, 30)
+        pose.until(lambda: pose.far() > 0.05, LONG_S)
         runner.pause()
         heard.until(ProgramPaused)
         heard.events.clear()

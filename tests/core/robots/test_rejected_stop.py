@@ -20,8 +20,10 @@ from app.run import FAILED, run_file
 from app.ui.shell.bars.app_bar import robots_chip
 from nep.masters.master import Master
 from tests.blocks.samples import block, number, started, workspace
-from tests.blocks.wire_robot import WireRobot
-from tests.core.waiting import tick_until
+from tests.blocks.wire_robot import WireRobot, usual_time_limits
+from tests.core.waiting import stop_unanswered, tick_until
+
+pytestmark = pytest.mark.usefixtures("patient_robots")
 
 LONG_S = 60.0
 SAID = "Arm may still move: the brake does not answer"
@@ -57,7 +59,7 @@ def arm(master: Master) -> Iterator[Driver]:
 
 def the_link(session: Session, name: str = "Arm") -> RobotLink:
     def ready() -> bool:
-        """Whether Stop knows the robot, and the robot has sent its first heartbeat."""
+        """Whether Stop knows the robot and would reach it."""
         link = session.fleet.link(name)
         known = session.stopper is not None and name in session.stopper.robots
         return known and link is not None and link.state == "ready"
@@ -94,7 +96,7 @@ def test_rejected_stop_is_shown_in_run_bar_chips_health_alert_and_console(
     session.runs.stop()
     assert session.runs.view().title == "Stopping"  # at once, without “Ready” in between
     tick_until(session, lambda: session.runs.view().state == "proven")
-    assert link.chip_text.removeprefix("virtual, ") == "ready"
+    tick_until(session, lambda: link.chip_text.removeprefix("virtual, ") == "ready")
     assert not session.alerts.has("stop")
 
 
@@ -135,8 +137,7 @@ def test_stop_includes_a_robot_lost_after_a_rejected_stop_until_the_user_confirm
         session.runs.stop_robot("Arm")
         tick_until(session, lambda: link.stop_problem)
     tick_until(session, lambda: not link.is_connected)
-    session.runs.stop()
-    tick_until(session, lambda: session.runs.view().state == "unanswered")
+    stop_unanswered(session)
     assert session.runs.view().confirm_label == "Arm isn't moving"
     session.runs.confirm_stopped()
     assert link.state == "away"
@@ -238,8 +239,9 @@ def pepper(master: Master) -> Iterator[WireRobot]:
     made.close()
 
 
-def lives(pepper: WireRobot, *not_ended: str) -> None:
+def lives(session: Session, pepper: WireRobot, *not_ended: str) -> None:
     """Publish a heartbeat with the robot parts that are still moving, in the format of the robot kit."""
+    tick_until(session, lambda: pepper._answer.subscribers >= 2, LONG_S)  # the fleet and Stop
     error = f"Pepper may still move: {', '.join(not_ended)} has not ended" if not_ended else None
     told = {"op": "alive", "id": "", "action": "", "state": "running"}
     pepper._answer.publish({**told, "not_ended": list(not_ended), "error": error})
@@ -252,14 +254,13 @@ def test_ongoing_action_is_shown_until_robot_reports_its_end(session: Session, p
     pepper._say = lambda command, state, error="": say_(command, "failed", said)  # type: ignore[method-assign]
     session.runs.stop()
     tick_until(session, lambda: session.runs.view().title == said)
-    lives(pepper, "turn")
+    lives(session, pepper, "turn")
     tick_until(session, lambda: link.unended_actions == said)
     tick_until(session, lambda: session.alerts.has("moving:Pepper"))
     pepper._say = say_  # type: ignore[method-assign]
-    lives(pepper)
+    lives(session, pepper)
     tick_until(session, lambda: session.runs.view().state == "proven")  # Stop was sent again
-    stop_ids = {each["id"] for each in pepper.heard("stop")}  # a stop is repeated until it is answered
-    assert len(stop_ids) == 2
+    assert len(pepper.heard("stop")) == 2
     assert link.state == "ready"
     tick_until(session, lambda: not session.alerts.has("moving:Pepper"))
 
@@ -273,17 +274,15 @@ def test_stop_is_repeated_only_once_for_a_robot_whose_stop_is_always_late(
     session.runs.stop()
     for stops in (1, 2, 2, 2):  # replies late, reports the stop as not ended, then ends
         tick_until(session, lambda: session.runs.view().state == "unanswered", LONG_S)
-        lives(pepper, "the stop function")
+        lives(session, pepper, "the stop function")
         tick_until(session, lambda: link.unended_actions, LONG_S)
-        assert (
-            len({each["id"] for each in pepper.heard("stop")}) == stops
-        )  # a stop may be repeated until it is answered
-        lives(pepper)
+        assert len(pepper.heard("stop")) == stops
+        lives(session, pepper)
         tick_until(session, lambda: not link.unended_actions, LONG_S)
         session.tick()
     assert (link.state, session.runs.view().confirm_label) == ("not stopped", "Pepper isn't moving")
     session.runs.stop()  # Stop by a person gives the robot another chance
-    tick_until(session, lambda: len({each["id"] for each in pepper.heard("stop")}) == 3, LONG_S)
+    tick_until(session, lambda: len(pepper.heard("stop")) == 3, LONG_S)
     tick_until(session, lambda: session.runs.view().state == "unanswered", LONG_S)
 
 
@@ -291,19 +290,22 @@ def test_robot_lost_after_reporting_possible_motion_stays_an_error(session: Sess
     with nep.node("arm", master=master.address) as node, Driver(ARM, "Arm", node) as arm:
         link = the_link(session)
         told = {"op": "alive", "id": "", "action": "", "state": "running", "not_ended": ["the stop function"]}
-        arm._publish(arm.robot.topics.reply, {**told, "error": SAID})
-        tick_until(session, lambda: link.state == "not stopped")
+
+        def is_told() -> bool:
+            arm._publish(arm.robot.topics.reply, {**told, "error": SAID})
+            return link.state == "not stopped"
+
+        tick_until(session, is_told)
     tick_until(session, lambda: not link.is_connected)
     assert (link.state, link.stop_problem) == ("not stopped", SAID)
-    session.runs.stop()
-    tick_until(session, lambda: session.runs.view().state == "unanswered")
+    stop_unanswered(session)
     session.runs.confirm_stopped()
     assert link.state == "away"
 
 
 def test_disconnected_virtual_robot_is_not_moving(session: Session, pepper: WireRobot) -> None:
     link = the_link(session, "Pepper")
-    lives(pepper, "turn")
+    lives(session, pepper, "turn")
     tick_until(session, lambda: link.state == "not stopped")
     link.robot = replace(link.robot, virtual=True)
     session.fleet._disconnect(link)
@@ -312,9 +314,9 @@ def test_disconnected_virtual_robot_is_not_moving(session: Session, pepper: Wire
 
 def test_action_that_ends_after_its_timeout_causes_no_stop(session: Session, pepper: WireRobot) -> None:
     link = the_link(session, "Pepper")
-    lives(pepper, "turn")
+    lives(session, pepper, "turn")
     tick_until(session, lambda: link.state == "not stopped")
-    lives(pepper)
+    lives(session, pepper)
     tick_until(session, lambda: link.state == "ready")
     session.tick()
     assert pepper.heard("stop") == []
@@ -323,8 +325,9 @@ def test_action_that_ends_after_its_timeout_causes_no_stop(session: Session, pep
 def test_late_stop_reply_updates_the_result(session: Session, pepper: WireRobot) -> None:
     the_link(session, "Pepper")
     pepper.silent = {"stop"}
-    session.runs.stop()
-    tick_until(session, lambda: session.runs.view().title == "Pepper didn't reply")
+    stop_unanswered(session)
+    assert session.runs.view().title == "Pepper didn't reply"
+    tick_until(session, lambda: pepper.heard("stop"))
     pepper._say(pepper.heard("stop")[0], "failed", "the brake is stuck")
     tick_until(session, lambda: session.runs.view().title == "Pepper may still move: the brake is stuck")
     pepper._say(pepper.heard("stop")[0], "succeeded")
@@ -344,8 +347,9 @@ def test_robot_that_did_not_reply_to_the_program_is_named_by_stop(
     session.runs.run()
     runner = session.runs._runner
     assert runner is not None
-    session.runs.on_runner_event(ProgramEnded(run=runner.run, unresponsive_robots=("Pepper",)))
-    tick_until(session, lambda: session.runs.view().state == "unanswered")
+    with usual_time_limits():
+        session.runs.on_runner_event(ProgramEnded(run=runner.run, unresponsive_robots=("Pepper",)))
+        tick_until(session, lambda: session.runs.view().state == "unanswered")
     assert session.runs.view().title == "Pepper didn't reply"
     runner.close()
 

@@ -24,7 +24,8 @@ from app.robots.description.description import thing_description
 from app.robots.turtle import ROBOT
 from nep.masters.master import Master
 from tests.blocks.samples import block, number, started, workspace
-from tests.core.waiting import tick_until
+from tests.blocks.wire_robot import usual_time_limits
+from tests.core.waiting import stop_unanswered, tick_until
 
 ROOT = Path(__file__).parents[3]
 FOUND_S = 60.0
@@ -50,7 +51,7 @@ class Turtles:
     def close(self) -> None:
         for process in self._processes:
             process.kill()
-            process.wait(5)
+            process.wait(SAID_S)
 
 
 @pytest.fixture
@@ -64,6 +65,7 @@ def there(session: Session) -> RobotLink:
     def link() -> RobotLink | None:
         found = session.fleet.link("Turtle")
         ready = found is not None and found.is_connected and found.publisher is not None
+        ready = ready and found.publisher.subscribers > 0
         return found if ready and session.stopper is not None and session.stopper.robots else None
 
     tick_until(session, link, FOUND_S)
@@ -109,9 +111,10 @@ def test_robot_killed_during_an_action_is_reported(session: Session, turtles: Tu
     there(session)
     runs(session, turtles)
     process.kill()
-    says_so_at_the_block(session)
-    # A virtual robot is only a process: once it has ended, there is nothing to switch off.
-    tick_until(session, lambda: session.runs.view().state == "ready", SAID_S)
+    with usual_time_limits():
+        says_so_at_the_block(session)
+        # A virtual robot is only a process: once it has ended, there is nothing to switch off.
+        tick_until(session, lambda: session.runs.view().state == "ready", SAID_S)
     tick_until(session, lambda: not session.fleet.connected, FOUND_S)
     turtles.start()
     well_again(session, turtles)
@@ -122,10 +125,11 @@ def test_robot_that_hangs_during_an_action_is_reported(session: Session, turtles
     link = there(session)
     runs(session, turtles)
     process.send_signal(signal.SIGSTOP)
-    says_so_at_the_block(session)
-    tick_until(session, lambda: session.runs.view().state == "unanswered", SAID_S)
-    tried = session.fleet.invoke("Turtle", "light", {})  # an action from the panel fails, too
-    tick_until(session, lambda: not tried.is_running, SAID_S)
+    with usual_time_limits():
+        says_so_at_the_block(session)
+        tick_until(session, lambda: session.runs.view().state == "unanswered", SAID_S)
+        tried = session.fleet.invoke("Turtle", "light", {})  # an action from the panel fails, too
+        tick_until(session, lambda: not tried.is_running, SAID_S)
     told = ("not responding", "disconnected", "can't be reached")  # depends on when the master notices
     assert any(words in (tried.error or "") for words in told)
     if link.is_connected:
@@ -258,12 +262,12 @@ def test_feedback_flood_is_processed_with_bounded_work_per_tick(
 
 
 def test_robot_that_never_replies_is_reported(session: Session, liar: Liar, tried: Invocation) -> None:
-    tick_until(session, lambda: not tried.is_running, SAID_S)
+    with usual_time_limits():
+        tick_until(session, lambda: not tried.is_running, SAID_S)
     assert tried.error == "Turtle isn't responding. Check that it is switched on."
     assert session.fleet.link("Turtle").state == "not stopped"  # type: ignore[union-attr]
     tick_until(session, lambda: liar.commands[-1]["op"] == "cancel")
-    session.runs.stop()
-    tick_until(session, lambda: session.runs.view().state == "unanswered", SAID_S)
+    stop_unanswered(session)
     assert session.runs.view().title == "Turtle didn't reply"
 
 
@@ -272,6 +276,7 @@ def test_robot_that_falls_silent_during_an_action_is_reported(
 ) -> None:
     liar.say(tried, "running")
     tick_until(session, lambda: tried.state == "running")
-    tick_until(session, lambda: not tried.is_running, SAID_S)
+    with usual_time_limits():
+        tick_until(session, lambda: not tried.is_running, SAID_S)
     assert tried.error is not None
     assert "stopped responding" in tried.error

@@ -14,7 +14,8 @@ from app.core.network.master import DISCOVERY_TIMEOUT_S
 from app.core.network.source import GraphReceived
 from app.core.session import Session
 from app.robots.kit import Call, Driver, Kind, Link, action, safe_stop
-from tests.core.waiting import tick_until
+from tests.blocks.wire_robot import usual_time_limits
+from tests.core.waiting import stop_unanswered, tick_until
 
 
 class Lamp:
@@ -74,9 +75,10 @@ def test_robot_lost_during_a_program_is_named_until_it_replies(session: Session)
         tick_until(session, lambda: not session.fleet.connected)
         tick_until(session, lambda: is_needed(session))
         for _ in range(2):  # “Stop again” without a reply proves nothing, either
-            session.runs.stop()
-            tick_until(session, lambda: session.runs.view().state == "stopping")
-            tick_until(session, lambda: session.runs.view().state != "stopping")
+            with usual_time_limits():
+                session.runs.stop()
+                tick_until(session, lambda: session.runs.view().state == "stopping")
+                tick_until(session, lambda: session.runs.view().state != "stopping")
             assert session.runs.view().title == "Lamp didn't reply"
             assert not session.runs.view().can_run
             tick_until(session, lambda: not is_needed(session))
@@ -96,8 +98,7 @@ def test_user_can_confirm_that_a_lost_robot_stands_still(session: Session) -> No
     with nep.node("lamps") as node, used_by_a_program(session, node):
         pass
     tick_until(session, lambda: not session.fleet.connected)
-    session.runs.stop()
-    tick_until(session, lambda: session.runs.view().state == "unanswered")
+    stop_unanswered(session)
     session.runs.confirm_stopped()
     tick_until(session, lambda: not within_reach(session))
 
@@ -109,9 +110,10 @@ def test_robots_unknown_to_a_new_master_stay_connected_during_discovery(
         driver = Driver(LAMP, "Lamp", node)
         driver.start()
         tick_until(session, lambda: within_reach(session))
+        session.live.source.close()  # from here on, the test passes the graphs in
+        session.tick()  # applies what the source has delivered before
         driver.close()
         graph = session.live.graph
-        session.live.source.close()  # from here on, the test passes the graphs in
         assert graph is not None
         empty = replace(graph, epoch=graph.epoch + 1, nodes={}, topics={})
         now = time.monotonic()

@@ -29,7 +29,13 @@ def node(master: Master) -> Iterator[nep.Node]:
 def there(session: Session, *names: str) -> None:
     def all_of_them() -> bool:
         links = [session.fleet.link(name) for name in names]
-        ready = all(link is not None and link.is_connected and link.publisher is not None for link in links)
+        ready = all(
+            link is not None
+            and link.is_connected
+            and link.publisher is not None
+            and link.publisher.subscribers
+            for link in links
+        )
         return bool(ready and session.stopper is not None and set(names) <= set(session.stopper.robots))
 
     tick_until(session, all_of_them, FOUND_S)
@@ -233,4 +239,5 @@ def test_slow_motion_does_not_lengthen_a_drive(session: Session, node: nep.Node)
         tick_until(session, wheels.is_still)
         tick_until(session, lambda: not session.runs.active, FOUND_S)
         way = math.dist(first, wheels.pose()[:2])
-        assert 0.05 < way < 0.2  # 0.1 m; driving on during the pauses would give at least 0.4 m
+        # 0.1 m, or more if the computer was busy; driving on during the pauses would give at least 0.4 m
+        assert 0.05 < way < 0.35
