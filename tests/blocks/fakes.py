@@ -10,11 +10,11 @@ from app.blocks.runtime.link import RobotCall
 from app.blocks.runtime.questions import ProgramQuestion
 from app.blocks.runtime.runtime import Runtime
 from app.blocks.runtime.scheduler import ScriptGroup
-from app.clock import ThreadClock
+from app.clock import ThreadClock, VirtualClock
 from app.robots.description.description import Robot
 from tests.blocks.samples import robot
 
-LONG_S = 30.0
+LONG_S = 60.0
 
 
 class FakeLink:
@@ -138,9 +138,10 @@ class Play:
 
 
 def play(workspace: Mapping[str, object], link: FakeLink | None = None) -> Play:
-    """Compile a behaviour and run it to its end with one robot, Pepper."""
+    """Compile a behaviour and run it to its end in virtual time with one robot, Pepper."""
     pepper = robot()
-    return Play(compile_behaviour(workspace, [pepper]), (pepper,), link).start().end()
+    program = compile_behaviour(workspace, [pepper])
+    return Play(program, (pepper,), link, clock=VirtualClock()).start().end()
 
 
 def until(ready: Callable[[], bool], timeout_s: float = LONG_S) -> None:

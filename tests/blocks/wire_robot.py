@@ -22,7 +22,11 @@ def usual_time_limits() -> Iterator[None]:
     """
     limits = "app.robots.client.limits."
     with pytest.MonkeyPatch.context() as patched:
-        for name, seconds in (("STOP_TIMEOUT_S", 3.0), ("FIRST_REPLY_TIMEOUT_S", 3.0), ("MIN_SILENCE_S", 2.0)):
+        for name, seconds in (
+            ("STOP_TIMEOUT_S", 3.0),
+            ("FIRST_REPLY_TIMEOUT_S", 3.0),
+            ("MIN_SILENCE_S", 2.0),
+        ):
             patched.setattr(limits + name, seconds)
         patched.setattr("app.core.robots.invocations.FIRST_REPLY_TIMEOUT_S", 3.0)
         yield

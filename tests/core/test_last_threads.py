@@ -22,7 +22,7 @@ sys.exit(end_process(3, 0.1))
 def ran(name: str, *, daemon: bool) -> subprocess.CompletedProcess[str]:
     program = PROGRAM.format(name=name, daemon=daemon)
     return subprocess.run(
-        [sys.executable, "-c", program], check=False, capture_output=True, text=True, timeout=60
+        [sys.executable, "-c", program], check=False, capture_output=True, text=True, timeout=120
     )
 
 

@@ -25,6 +25,7 @@ from tests.nep.programs import eventually
 
 pytestmark = pytest.mark.usefixtures("patient")  # records are published once
 
+
 def told(session: Session, origin: str) -> list[str]:
     return [line.text for line in session.console.records if line.origin == origin]
 

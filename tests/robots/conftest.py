@@ -28,7 +28,7 @@ from app.robots.kit import (
 )
 
 
-def eventually(true: Callable[[], object], timeout_s: float = 30.0) -> None:
+def eventually(true: Callable[[], object], timeout_s: float = 60.0) -> None:
     """Wait until `true()` is true; fail after `timeout_s` seconds."""
     never = threading.Event()
     end = time.monotonic() + timeout_s
@@ -194,7 +194,7 @@ class Ears:
     def states(self, wanted: str) -> list[object]:
         return [a["state"] for a in self.answers(wanted)]
 
-    def final(self, wanted: str, op: str = "invoke", timeout_s: float = 30.0) -> dict[str, object]:
+    def final(self, wanted: str, op: str = "invoke", timeout_s: float = 60.0) -> dict[str, object]:
         """Wait for the final reply to a command and return it."""
 
         def ends() -> list[dict[str, object]]:

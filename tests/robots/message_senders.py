@@ -21,7 +21,7 @@ from nep.masters.master import Master
 from tests.blocks.samples import robot
 from tests.blocks.wire_robot import WireRobot
 
-SHORT_S = 0.3
+SHORT_S = 3.0
 """Waiting time in seconds for a robot that does not reply."""
 
 
@@ -180,6 +180,7 @@ class MessageSenderContract:
             assert side.claim("/Pepper/description")
             side.until(lambda: side.hearing_commands() == 2)
             assert side.stop(SHORT_S if silent else 30.0) is not silent
+            side.until(lambda: pepper.heard("stop") and twin.heard("stop"))
             assert (len(pepper.heard("stop")), len(twin.heard("stop"))) == (1, 1)
         finally:
             twin.close()

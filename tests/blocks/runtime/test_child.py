@@ -29,11 +29,12 @@ from app.blocks.runtime.events import (
     VariablesChanged,
 )
 from tests.blocks.samples import block, get, number, say, stack, started, text, workspace, write
-from tests.blocks.wire_robot import WireRobot
+from tests.blocks.wire_robot import WireRobot, usual_time_limits
 
 Event = TypeVar("Event", bound=RunnerEvent)
 
-LONG_S = 30.0
+LONG_S = 60.0
+pytestmark = pytest.mark.usefixtures("patient", "patient_robots")
 
 
 class Pipe(io.TextIOBase):
@@ -229,8 +230,9 @@ def test_program_ends_and_stops_robot_when_its_stdin_closes(running, pepper, mas
 
 def test_robot_that_does_not_confirm_final_stop_is_named(running, pepper, master):
     pepper.silent = {"stop"}
-    running.start(workspace(started(say("Hi"))), [pepper.described], master.address)
-    assert running.until(ProgramEnded).unresponsive_robots == ("Pepper",)
+    with usual_time_limits():
+        running.start(workspace(started(say("Hi"))), [pepper.described], master.address)
+        assert running.until(ProgramEnded).unresponsive_robots == ("Pepper",)
 
 
 def test_robot_event_starts_its_script(running, pepper, master):
@@ -247,13 +249,14 @@ def test_robot_event_starts_its_script(running, pepper, master):
     assert LinePrinted(text="ouch") in running.said
 
 
-def test_printed_output_of_a_program_is_bounded_in_lines_and_line_length(running, master):
+def test_printed_output_of_a_program_is_bounded_in_lines_and_line_length(running, master, monkeypatch):
+    monkeypatch.setattr(child, "SAMPLE_INTERVAL_S", LONG_S)  # the lines of one sample, at the end
     flood = block("control_repeat", TIMES=number(5000), BODY=[write(text("x" * 3000))])
     running.start(workspace(started(flood)), master=master.address)
     running.until(ProgramEnded)
     lines = [said.text for said in running.said if isinstance(said, LinePrinted)]
-    assert len(lines) < 3000
-    assert any("were dropped: too many at once" in line for line in lines)
+    assert len(lines) == child.LINES_PER_SAMPLE + 1
+    assert lines[-1] == f"{5000 - child.LINES_PER_SAMPLE} lines were dropped: too many at once"
     assert max(map(len, lines)) <= child.MAX_LINE_LENGTH
 
 

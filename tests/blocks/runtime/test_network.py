@@ -12,6 +12,8 @@ from tests import hostile
 from tests.blocks.fakes import until
 from tests.blocks.wire_robot import RizeRobot, WireRobot
 
+pytestmark = pytest.mark.usefixtures("patient")
+
 
 @pytest.fixture
 def pepper(master):
@@ -50,7 +52,7 @@ def test_invoked_action_returns_its_output(network, pepper):
     assert command == {
         "id": call.id, "op": "invoke", "from": "program-1", "action": "say", "input": {"text": "Hi"},
     }  # fmt: skip
-    assert pokes
+    until(lambda: bool(pokes))
 
 
 def test_replies_from_other_robots_and_invalid_replies_are_ignored(network, pepper, node):
@@ -122,7 +124,7 @@ def test_sensor_values_events_and_messages_are_received(network, pepper, node):
 def test_stop_waits_for_replies_and_names_silent_robots(network, pepper):
     outside: list[str] = []
     network.set_callbacks(lambda: None, outside.append)
-    assert network.stop_robots(2.0) == ()
+    assert network.stop_robots(60.0) == ()
     pepper.silent = {"stop"}
     assert network.stop_robots(0.05) == ("Pepper",)
     assert outside == []
@@ -171,11 +173,11 @@ def test_rize_robot_receives_commands_in_rize_format(master, node):
 def test_robots_are_found_by_topic_type(master, node, pepper):
     turtle = WireRobot(master.address, "Turtle 2")
     try:
-        found = find_robots(node, 5.0, expected=["Pepper", "Turtle 2"])
+        found = find_robots(node, 60.0, expected=["Pepper", "Turtle 2"])
         assert [robot.name for robot in found.robots] == ["Pepper", "Turtle 2"]
         assert found.owners["Pepper"].node_id == pepper._node.id
-        assert [robot.name for robot in find_robots(node, 5.0).robots] == ["Pepper", "Turtle 2"]
-        wanted = find_robots(node, 0.2, expected=["NAO"])
+        assert [robot.name for robot in find_robots(node, 60.0).robots] == ["Pepper", "Turtle 2"]
+        wanted = find_robots(node, 3.0, expected=["NAO"])  # long enough for the others
         assert ([robot.name for robot in wanted.robots], wanted.rejected_claims) == (
             ["Pepper", "Turtle 2"],
             (),

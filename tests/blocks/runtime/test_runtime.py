@@ -65,7 +65,7 @@ def test_status_text_of_running_action_remains_when_another_script_ends(running)
     # The other script ends in the meantime and must not clear the status text.
     until(lambda: run.runtime.scheduler.snapshot().blocks == ("x",))
     assert run.runtime.status_text.text(["x"]) == "Pepper says “Touch my head.”"
-    link.answer(link.calls[0], "succeeded")
+    link.answer(next(call for call in link.calls if call.action == "say"), "succeeded")
     run.end()
     assert run.runtime.status_text.text(["l"]) == "Pepper light eyes #37b6ff"
 

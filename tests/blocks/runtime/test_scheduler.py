@@ -1,19 +1,19 @@
 from __future__ import annotations
 
 import threading
-import time
 
 import pytest
 
 from app.blocks.runtime.scheduler import Scheduler
+from app.clock import ThreadClock, VirtualClock
 from tests.blocks.fakes import until
 
 
 class Stage:
     """Scheduler, and a log of what its scripts did."""
 
-    def __init__(self) -> None:
-        self.scheduler = Scheduler()
+    def __init__(self, clock: ThreadClock | None = None) -> None:
+        self.scheduler = Scheduler(clock)
         self.did: list[str] = []
         self.threads: list[threading.Thread] = []
 
@@ -34,7 +34,7 @@ class Stage:
 
     def join(self) -> None:
         for thread in self.threads:
-            thread.join(10)
+            thread.join(60)
             assert not thread.is_alive()
 
 
@@ -137,7 +137,7 @@ def test_step_runs_wait_to_its_end(stage):
 def test_step_during_a_wait_completes_the_remaining_wait(stage):
     def work(_name: str) -> None:
         stage.scheduler.step("wait")
-        stage.scheduler.wait(1.0)
+        stage.scheduler.wait(3.0)
         stage.did.append("waited")
         stage.scheduler.step("next")
 
@@ -177,7 +177,7 @@ def test_wake_from_another_thread_ends_the_wait(stage):
     arrived = []
 
     def work(_name: str) -> None:
-        assert stage.scheduler.wait_for(lambda: bool(arrived), 10)
+        assert stage.scheduler.wait_for(lambda: bool(arrived), 60)
         stage.did.append("got it")
 
     stage.script("a", work)
@@ -193,7 +193,7 @@ def test_pause_takes_effect_only_after_running_robot_action(stage):
 
     def work(_name: str) -> None:
         stage.scheduler.step("move")
-        stage.scheduler.wait_for(lambda: bool(answered), 10)
+        stage.scheduler.wait_for(lambda: bool(answered), 60)
         stage.scheduler.step("next")
 
     stage.script("a", work)
@@ -258,23 +258,24 @@ def test_step_outside_script_raises(stage):
         stage.scheduler.step("x")
 
 
-def test_slow_motion_delays_each_block_while_other_scripts_run(stage):
-    stage.scheduler.set_pace(0.05)
-    began = time.monotonic()
-    stage.script("a", stage.steps("a1", "a2"))
-    stage.script("b", stage.steps("b1", "b2"))
-    until(lambda: set(stage.scheduler.snapshot().blocks) == {"a1", "b1"})
+def test_slow_motion_delays_each_block_while_other_scripts_run():
+    clock = VirtualClock(0.0)
+    stage = Stage(clock)
+    stage.scheduler.set_pace(0.5)
+    with stage.scheduler.defer_turns():
+        stage.script("a", stage.steps("a1", "a2"))
+        stage.script("b", stage.steps("b1", "b2"))
     stage.join()
-    assert sorted(stage.did) == ["a1", "a2", "b1", "b2"]
-    assert 0.1 <= time.monotonic() - began < 5.0
+    assert stage.did == ["a1", "b1", "a2", "b2"]
+    assert clock.now() == 1.0  # both scripts together: their delays are simultaneous
 
 
 def test_slow_motion_ends_immediately_when_disabled(stage):
     stage.scheduler.set_pace(60.0)
     stage.script("a", stage.steps("a1", "a2", "a3"))
     until(lambda: stage.scheduler.snapshot().blocks == ("a1",))
+    stage.scheduler.pause()  # before the change of pace, after which the block would run
     stage.scheduler.set_pace(0.0)
-    stage.scheduler.pause()
     until(lambda: stage.scheduler.snapshot().is_paused)
     assert stage.did == []
     stage.scheduler.step_once()  # a step doesn't wait for the remaining delay of a minute

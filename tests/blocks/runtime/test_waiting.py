@@ -2,18 +2,52 @@
 
 from __future__ import annotations
 
-import time
+from collections.abc import Callable
 from dataclasses import replace
 
+import pytest
+
 from app.blocks.compiler.compiler import compile_behaviour
+from app.blocks.runtime import robot_handle
+from app.clock import VirtualClock
+from app.robots.client.limits import MIN_SILENCE_S
 from tests.blocks.fakes import FakeLink, Play, until
 from tests.blocks.samples import robot, say, started, text, workspace, write
 
 
-def begin(link: FakeLink, beat_s: float | None = None) -> Play:
+def begin(link: FakeLink, clock: VirtualClock, beat_s: float | None = None) -> Play:
     pepper = replace(robot(), heartbeat_interval_s=beat_s)
     blocks = workspace(started(say("Hi") | {"id": "x"}, write(text("after"))))
-    return Play(compile_behaviour(blocks, [pepper]), (pepper,), link).start()
+    return Play(compile_behaviour(blocks, [pepper]), (pepper,), link, clock=clock).start()
+
+
+@pytest.fixture
+def clock() -> VirtualClock:
+    return VirtualClock(advances_alone=False)
+
+
+@pytest.fixture
+def checked_s(clock: VirtualClock, monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """Times at which the program has checked whether its robot is silent."""
+    times_s: list[float] = []
+    is_silent = robot_handle.is_silent
+
+    def recorded(*arguments: object) -> bool:
+        times_s.append(clock.now())
+        return is_silent(*arguments)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(robot_handle, "is_silent", recorded)
+    return times_s
+
+
+def advance_until(clock: VirtualClock, ready: Callable[[], bool]) -> None:
+    """Advance the time in small steps, because the program may still be about to wait."""
+
+    def advanced() -> bool:
+        clock.advance(0.02)
+        return ready()
+
+    until(advanced)
 
 
 class Queued(FakeLink):
@@ -26,34 +60,42 @@ class Queued(FakeLink):
         return call
 
 
-def test_queued_action_shows_the_awaited_action_and_then_its_own_activity(monkeypatch) -> None:
-    monkeypatch.setattr("app.robots.client.limits.ACTION_MARGIN_S", -29.5)  # time limit of 0.5 s
+def test_queued_action_shows_the_awaited_action_and_then_its_own_activity(
+    clock: VirtualClock, checked_s: list[float]
+) -> None:
     link = Queued()
-    run = begin(link)
+    run = begin(link, clock)
     until(lambda: bool(link.calls))
     said = lambda: run.runtime.status_text.text(("x",))  # noqa: E731
     until(lambda: said() == "Pepper is waiting for “look”")
-    begun = time.monotonic()
-    until(lambda: time.monotonic() > begun + 0.7)  # longer than the time limit, which hasn't started
+    for _ in range(3):  # longer than the time limit of 30 s, which hasn't started
+        count = len(checked_s)
+        clock.advance(20.0)
+        advance_until(clock, lambda count=count: len(checked_s) > count)  # type: ignore[misc]
     assert not run.runtime.finished.is_set()
     link.calls[0].has_started = True
     link.calls[0].state = "running"
-    until(lambda: said() == "Pepper says “Hi”")
+    advance_until(clock, lambda: said() == "Pepper says “Hi”")
     link.answer(link.calls[0], "succeeded")
     assert run.end().lines == ["after"]
 
 
-def test_robot_whose_heartbeat_stops_is_an_error_at_the_block(monkeypatch) -> None:
-    monkeypatch.setattr("app.robots.client.limits.MIN_SILENCE_S", 0.3)
+def test_robot_whose_heartbeat_stops_is_an_error_at_the_block(
+    clock: VirtualClock, checked_s: list[float]
+) -> None:
     link = FakeLink()
     link.held = {"say"}
-    run = begin(link, beat_s=0.05)
+    run = begin(link, clock, beat_s=0.05)
     until(lambda: bool(link.calls))
-    heard_until = time.monotonic() + 0.8
-    while time.monotonic() < heard_until:  # heartbeats arrive, so there is no error
-        link.calls[0].last_reply_s = time.monotonic()
-        assert not run.runtime.finished.wait(0.02)
-    run.end(3.0)
+
+    def is_long_heard() -> bool:
+        link.calls[0].last_reply_s = clock.now()
+        return bool(checked_s) and checked_s[-1] - checked_s[0] > 2 * MIN_SILENCE_S
+
+    advance_until(clock, is_long_heard)
+    assert not run.runtime.finished.is_set()  # heartbeats arrive, so there is no error
+    advance_until(clock, run.runtime.finished.is_set)
+    run.end()
     error = run.runtime.error
     assert error is not None
     assert (error.block, error.sentence) == (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import nep
@@ -15,6 +16,12 @@ from app.core.storage.settings import Settings
 from tests.core.waiting import tick_until
 
 STILL = SavedMessage("a", "Stand still", "/cmd_vel", "json", '{"x": 0, "id": {new id}}', (), 20.0)
+
+
+def ended_count(session: Session) -> int | None:
+    """Return how often the repeated message was sent, or None before its end."""
+    found = (re.search(r"(\d+) sent", each.result_text) for each in session.acting.sent_log.records)
+    return next((int(match[1]) for match in found if match), None)
 
 
 def test_messages_and_calls_are_sent_and_stop_disarms(session: Session) -> None:
@@ -60,12 +67,12 @@ def test_messages_and_calls_are_sent_and_stop_disarms(session: Session) -> None:
         session.runs.stop()
         assert not acting.arming.is_on
         assert acting.outbox.repeated_messages == ()
-        while heard.receive(0.0) is not None:
-            pass
+        tick_until(session, lambda: ended_count(session) is not None)
+        for _ in range(1, ended_count(session) or 0):  # the first one is `second`
+            assert heard.listen(timeout_s=20.0)[0]
         assert acting.resend(sent.number) == "Sending to /cmd_vel isn't armed. Arm it first."
         assert not acting.arming.is_on
         assert heard.receive(0.1) is None
-        tick_until(session, lambda: any(" sent" in each.result_text for each in acting.sent_log.records))
     said = [each.text for each in session.console.records]
     assert "armed for 5 min" in said
     assert "/cmd_vel: Stand still, 1 subscriber" in said

@@ -17,7 +17,7 @@ def test_doctor_runs_in_background_and_keeps_its_findings() -> None:
 
     def look(_topic: str, _tell: object) -> list[Finding]:
         looks.append(threading.current_thread().name)
-        go_on.wait(5)
+        go_on.wait(60)
         return [FINE]
 
     doctor = Doctor(look, lambda: 7.0)

@@ -77,12 +77,12 @@ def the_one_started(address: str) -> None:
     start.ensure_running()  # must not start a second master
     eventually(lambda: start.has_started)
     assert start.is_first_master
-    assert nep.is_running(address, 5)
+    assert nep.is_running(address, 60)
     start.close()
     assert told == []
     assert start._process is not None
     start._process.terminate()
-    start._process.wait(10)
+    start._process.wait(60)
 
 
 def test_master_is_started_when_none_is_running(free) -> None:

@@ -34,7 +34,7 @@ class World:
         self.came.set()
 
     def answer(self, reach):
-        assert self.came.wait(5.0)
+        assert self.came.wait(60.0)
         self.came.clear()
         reach.on_changed(self.posted.pop())
 
@@ -146,7 +146,7 @@ def test_last_remote_access_setting_is_sent_last_despite_slow_first_request(worl
 
     def slow(hosts, _address):
         if hosts:
-            assert may_go_on.wait(5.0)
+            assert may_go_on.wait(60.0)
         told.append(tuple(hosts))
 
     monkeypatch.setattr(world, "ask", slow)

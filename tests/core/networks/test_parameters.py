@@ -178,6 +178,7 @@ def test_foreign_messages_on_parameter_topic_are_decoded_or_reported(
     session: Session, robot: nep.Node, shown: NodeParameters
 ) -> None:
     with nep.node("stranger") as stranger, stranger.new_pub(parameters_topic(robot.id)) as loud:
+        tick_until(session, lambda: loud.subscribers)
         for payload in ("words", 7, {"parameters": None}, {}):
             loud.publish(payload)
         tick_until(session, lambda: _refreshed(shown).problem)

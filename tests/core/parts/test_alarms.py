@@ -24,6 +24,7 @@ def alert(session: Session, rule: AlarmRule):
     return next((each for each in session.alerts.active if each.id == f"alarm:{rule.id}"), None)
 
 
+@pytest.mark.usefixtures("patient")
 def test_alarm_triggered_by_a_value_calls_a_service_and_publishes(session: Session) -> None:
     asked, answer = [], "fine"
 
@@ -51,7 +52,7 @@ def test_alarm_triggered_by_a_value_calls_a_service_and_publishes(session: Sessi
         record = session.alarms.history.records[0]
         tick_until(session, lambda: len(record.action_results) == 4)
         assert asked == [{"n": 1}]
-        assert heard.listen(timeout_s=5.0) == (True, {"say": "near"})
+        assert heard.listen(timeout_s=60.0) == (True, {"say": "near"})
         assert {deed.kind: deed.text for deed in record.action_results} == {
             "call": "restart replied",
             "send": "sent to /say",
@@ -67,6 +68,7 @@ def test_alarm_triggered_by_a_value_calls_a_service_and_publishes(session: Sessi
         assert record.duration_s is not None
 
 
+@pytest.mark.usefixtures("patient")
 def test_alarm_moves_a_real_robot_only_after_confirmation(session: Session, master) -> None:
     moved: list[tuple[object, str]] = []
     session.alarms.on_moved = lambda robots, by: moved.append((robots, by))

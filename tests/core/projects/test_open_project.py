@@ -121,6 +121,7 @@ def test_journal_retry_fails_while_the_disk_is_unresponsive_and_then_succeeds(
     on_a_slow_disk.apply_edit(STARTED)
     assert slow.began.wait(60)
     assert not on_a_slow_disk.retry_journal()
+    monkeypatch.setattr("app.core.storage.background_worker.JOIN_TIMEOUT_S", 60.0)
     slow.goes.set()
     assert on_a_slow_disk.retry_journal()
 

@@ -227,6 +227,7 @@ def test_real_recorder_process_records_saves_and_finishes(master, tmp_path):
         client.set_ring(RingChoice(tmp_path / "ring"))
         assert client.record(tmp_path / "a.mcap", ("/a",), note="first")
         until(lambda: client.state.phase == "recording" and client.state.ring_s is not None)
+        until(lambda: publisher.subscribers > 0)
         for n in range(20):
             publisher.publish({"n": n})
         until(lambda: client.state.topics.get("/a") is not None and client.state.topics["/a"].received == 20)

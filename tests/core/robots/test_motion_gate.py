@@ -107,6 +107,7 @@ def test_robots_without_readable_description_need_permission(rover) -> None:
     assert permission.question.names == ("the robot on /Fido/go",)
 
 
+@pytest.mark.usefixtures("patient")
 def test_saved_message_needs_permission_and_repetition_ends_when_a_real_robot_connects(
     session: Session, master
 ) -> None:

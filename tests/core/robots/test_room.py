@@ -38,7 +38,7 @@ class Studio:
     def hear(self, other: RoomMap) -> None:
         with nep.node("robot", "memory") as node, node.new_sub("/told", "json") as heard:
             node.new_pub("/told", "json").publish(other.message())
-            message = heard.receive(5.0)
+            message = heard.receive(60.0)
         assert message is not None
         self.room.add_messages({TOPIC: Batch([message], 0)})
 

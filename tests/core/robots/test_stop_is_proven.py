@@ -21,8 +21,8 @@ from tests.blocks.fakes import until
 from tests.blocks.wire_robot import WireRobot
 
 pytestmark = pytest.mark.usefixtures("patient")
-LONG_S = 30.0
-SHORT_S = 1.5  # long enough for the other robots to reply on a busy computer
+LONG_S = 60.0
+SHORT_S = 3.0  # long enough for the other robots to reply on a busy computer
 
 
 @pytest.fixture
@@ -228,6 +228,7 @@ def test_late_stop_reply_is_accepted(stopper, pepper) -> None:
     late: list[StopReport] = []
     report = stopper.stop_all(timeout_s=0.1, on_late=late.append)
     assert not report.is_confirmed
+    until(lambda: bool(pepper.heard("stop")))
     (command,) = pepper.heard("stop")
     pepper._say(command, "failed", "the brake is stuck")
     until(lambda: len(late) == 1)
@@ -251,10 +252,11 @@ def test_late_reply_callback_can_use_the_stopper(stopper, pepper) -> None:
     def late(_report: StopReport) -> None:
         asking = threading.Thread(target=lambda: stopper.robots)
         asking.start()
-        asking.join(2.0)
+        asking.join(LONG_S)
         free.append(not asking.is_alive())
 
     stopper.stop_all(timeout_s=0.1, on_late=late)
+    until(lambda: bool(pepper.heard("stop")))
     (command,) = pepper.heard("stop")
     answer = {"id": command["id"], "op": "stop", "action": "stop", "state": "failed", "error": "stuck"}
     publisher = pepper._answer._spec.id

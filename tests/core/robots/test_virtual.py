@@ -89,7 +89,7 @@ def test_virtual_robot_started_by_another_studio_of_this_user_is_recognized(
         assert not VirtualProcesses().is_started_by_studio(Identity("n", "Turtle", HERE, made.pid))
     finally:
         made.terminate()
-        made.wait(10)
+        made.wait(60)
 
 
 def test_process_end_is_detected_only_on_this_computer(
@@ -99,7 +99,7 @@ def test_process_end_is_detected_only_on_this_computer(
     identity = Identity("n", "Turtle", HERE, process.pid)
     assert not known.has_ended(identity)
     process.kill()
-    process.wait(10)
+    process.wait(60)
     assert known.has_ended(identity)
     assert not known.has_ended(replace(identity, host="another-computer"))
     assert not known.has_ended(replace(identity, pid=None))
@@ -197,7 +197,7 @@ def test_foreign_virtual_robot_on_the_network_needs_permission(session: Session,
     environment = {**os.environ, "NEP_MASTER": master.address}
     made = subprocess.Popen([sys.executable, "-c", STRANGER], stdin=subprocess.PIPE, env=environment)
     try:
-        tick_until(session, lambda: session.fleet.link("Turtle"), 30.0)
+        tick_until(session, lambda: session.fleet.link("Turtle"))
         link = session.fleet.link("Turtle")
         assert link is not None
         assert not link.is_virtual

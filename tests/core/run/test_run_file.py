@@ -27,7 +27,10 @@ from app.run import FAILED, INTERRUPTED, MAY_NOT_MOVE, OK, ROBOT_MISSING, UNUSAB
 from nep.masters.master import Master
 from tests.blocks.fakes import until
 from tests.blocks.samples import block, number, robot, say, started, text, workspace, write
-from tests.blocks.wire_robot import RizeRobot, WireRobot
+from tests.blocks.wire_robot import RizeRobot, WireRobot, usual_time_limits
+
+pytestmark = pytest.mark.usefixtures("patient", "patient_robots")
+LONG_S = 120.0  # of processes; matters only if something is broken
 
 
 @pytest.fixture
@@ -93,7 +96,7 @@ def test_interrupt_stops_the_run_with_a_confirmed_stop(pepper, saved):
     thread.start()
     until(lambda: bool(pepper.heard("invoke")))
     interrupted.set()
-    thread.join(15)
+    thread.join(LONG_S)
     assert found[0][0] == INTERRUPTED
     assert "Pepper stopped (" in found[0][1]
 
@@ -118,7 +121,7 @@ def test_second_ctrl_c_does_not_interrupt_the_stop(pepper, saved, master, tmp_pa
     process.send_signal(signal.SIGINT)
     until(lambda: bool(pepper.heard("stop")))
     process.send_signal(signal.SIGINT)
-    out, _ = process.communicate(timeout=60)
+    out, _ = process.communicate(timeout=LONG_S)
     assert "Pepper didn't reply. Switch it off by hand." in out
     assert "Traceback" not in out
     assert process.returncode == (FAILED if how == "a file of Studio" else 0)
@@ -126,7 +129,8 @@ def test_second_ctrl_c_does_not_interrupt_the_stop(pepper, saved, master, tmp_pa
 
 def test_robot_that_does_not_reply_to_stop_is_named(pepper, saved):
     pepper.silent = {"stop"}
-    code, out = run(saved(workspace(started(say("Hi")))))
+    with usual_time_limits():
+        code, out = run(saved(workspace(started(say("Hi")))))
     assert code == FAILED
     assert "Pepper didn't reply. Switch it off by hand." in out
 
@@ -325,7 +329,7 @@ def test_generated_program_runs_as_a_python_file(master, pepper, tmp_path):
     path.write_text(compile_behaviour(saved, [robot()], name="Test").source, "utf-8")
     environment = {**os.environ, "PYTHONPATH": str(Path.cwd())}
     done = subprocess.run(
-        [sys.executable, path], env=environment, capture_output=True, text=True, timeout=30, check=False
+        [sys.executable, path], env=environment, capture_output=True, text=True, timeout=LONG_S, check=False
     )
     assert (done.returncode, done.stdout, done.stderr) == (0, "done\n", "")
     assert [command["action"] for command in pepper.heard("invoke")] == ["say"]
@@ -375,7 +379,7 @@ def test_characters_missing_in_the_output_encoding_are_replaced(master, saved, p
         [sys.executable, "-m", "app", "run", str(path)],
         capture_output=True,
         env={**os.environ, "PYTHONIOENCODING": page, "PYTHONUTF8": "0"},
-        timeout=30,
+        timeout=LONG_S,
         check=False,
     )
     assert (done.returncode, done.stderr) == (OK, b"")
@@ -423,7 +427,7 @@ def test_character_missing_in_ascii_output_of_a_program_file_is_replaced(master,
             "PYTHONIOENCODING": "ascii",
             "PYTHONUTF8": "0",
         },
-        timeout=120,
+        timeout=LONG_S,
         check=False,
     )
     assert (done.returncode, done.stderr) == (0, b"")

@@ -146,15 +146,16 @@ def test_program_that_closes_its_output_is_stopped(started, heard) -> None:
     assert heard.until(ProgramEnded).text == "The program lost its connection to Studio and was stopped."
 
 
-def child_of(heard: Heard, runner: Runner) -> psutil.Process:
+def child_of(heard: Heard, runner: Runner) -> int:
+    """Wait until the program has started its child process and return the PID, even if it has ended since."""
     deadline = time.monotonic() + LONG_S
     while not runner._error_lines:
         assert time.monotonic() < deadline
         threading.Event().wait(0.01)
-    return psutil.Process(int(runner._error_lines[0].split()[1]))
+    return int(runner._error_lines[0].split()[1])
 
 
-def gone(process: psutil.Process) -> bool:
+def gone(pid: int) -> bool:
     """Return whether a process ends in time.
 
     A zombie counts as ended, because a container without an init never reaps it.
@@ -162,7 +163,7 @@ def gone(process: psutil.Process) -> bool:
 
     def has_ended() -> bool:
         try:
-            return process.status() == psutil.STATUS_ZOMBIE
+            return psutil.Process(pid).status() == psutil.STATUS_ZOMBIE
         except psutil.NoSuchProcess:
             return True
 
@@ -174,7 +175,7 @@ def gone(process: psutil.Process) -> bool:
 
 @pytest.mark.parametrize("new", [False, True], ids=["in its group", "in a session of its own"])
 def test_child_processes_end_with_stop(started, heard, new) -> None:
-    left: list[psutil.Process] = []
+    left: list[int] = []
 
     def begin() -> Runner:
         runner = started(FORKS.format(new=new and os.name == "posix", wait=60))

@@ -14,9 +14,9 @@ from tests.blocks.fakes import until
 from tests.blocks.samples import block, number, say, started, workspace
 from tests.blocks.wire_robot import RizeRobot, WireRobot
 
-pytestmark = pytest.mark.usefixtures("patient")
-LONG_S = 30.0
-SILENT_S = 1.5  # time limit for silent robots, long enough for the others on a busy computer
+pytestmark = pytest.mark.usefixtures("patient", "patient_robots")
+LONG_S = 60.0
+SILENT_S = 3.0  # time limit for silent robots, long enough for the others on a busy computer
 
 
 @pytest.fixture
@@ -134,7 +134,7 @@ def test_stop_over_closed_node_is_reported(master, robots):
     with nep.node("studio", master=master.address) as node:
         stopper = RobotStopper(node)
         stopper.set_robots([robots[0].described])
-    report = stopper.stop_all()
+    report = stopper.stop_all(timeout_s=SILENT_S)
     assert not report.is_confirmed
     assert report.robots[0].message.startswith("Stop can't be sent to Pepper: ")
 

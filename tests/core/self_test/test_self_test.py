@@ -143,7 +143,7 @@ def test_hanging_process_is_ended_with_its_children(tmp_path: Path) -> None:
         [sys.executable, "-c", HANGS, str(tmp_path)],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=120,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         check=False,
     )
@@ -159,7 +159,7 @@ def test_hanging_process_is_ended_with_its_children(tmp_path: Path) -> None:
 def test_home_and_open_log_are_deleted_after_success(tmp_path: Path) -> None:
     subprocess.run(
         [sys.executable, "-c", WELL, str(tmp_path)],
-        timeout=60,
+        timeout=120,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         check=True,
     )

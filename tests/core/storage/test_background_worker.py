@@ -30,7 +30,7 @@ def test_only_newest_pending_job_runs(beside) -> None:
     go, did = threading.Event(), []
 
     def slow() -> str:
-        go.wait(10)
+        go.wait(60)
         return "slow"
 
     beside.submit("a", slow)

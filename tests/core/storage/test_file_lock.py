@@ -52,7 +52,7 @@ def test_unavailable_lock_times_out(tmp_path: Path, holder: subprocess.Popen[str
     began = time.monotonic()
     with locked(tmp_path / "file", within_s=0.2) as held:
         assert not held
-    assert 0.2 <= time.monotonic() - began < 5.0
+    assert time.monotonic() - began >= 0.2
 
 
 def test_file_system_without_locks_does_not_block(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -66,7 +66,7 @@ def test_file_system_without_locks_does_not_block(tmp_path: Path, monkeypatch: p
 
 def test_lock_is_released_when_its_process_is_killed(tmp_path: Path, holder: subprocess.Popen[str]) -> None:
     holder.kill()
-    with locked(tmp_path / "file", within_s=10.0) as held:
+    with locked(tmp_path / "file", within_s=60.0) as held:
         assert held
 
 
@@ -82,7 +82,7 @@ def test_file_lock_is_held_until_release_or_process_exit(
     turn, other = FileLock(tmp_path / "file"), FileLock(tmp_path / "file")
     assert not turn.acquire()
     holder.kill()
-    holder.wait(30)
+    holder.wait(60)
     assert turn.acquire()
     assert turn.acquire()
     assert not other.acquire()

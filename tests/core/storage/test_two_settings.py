@@ -86,7 +86,7 @@ def test_concurrent_writes_of_two_processes_lose_nothing(tmp_path: Path) -> None
         writer.stdin.write("go\n")
         writer.stdin.flush()
     for writer in writers:
-        writer.communicate(timeout=30)
+        writer.communicate(timeout=120)
         assert writer.returncode == 0
     kept = Settings(tmp_path).stored_values()
     assert [kept[f"{name} {number}"] for name in "ab" for number in range(50)] == [

@@ -61,11 +61,11 @@ ASYNC = '''
 AGENT = Kind(model="walker", title="Walker", body=Robot)
 '''
 DEAF = '''
-    @action("go", "Movement", "move", uses=("wheels",), risk="locomotes", timeout_s=9)
+    @action("go", "Movement", "move", uses=("wheels",), risk="locomotes", timeout_s=20)
     def go(self, call: Call) -> None:
         """Hears nothing of its end."""
         import time
-        time.sleep(8)
+        time.sleep(13)  # longer than the contract waits
 
 
 ROBOT = Kind(model="deaf", title="Deaf", body=Robot)

@@ -14,7 +14,7 @@ import nep
 from app.robots.description.description import parse
 from app.robots.driver.driver import Driver
 from tests.robots.conftest import Ears, eventually
-from tests.robots.driver.test_process import ended, network, start
+from tests.robots.driver.test_process import LONG_S, ended, network, start
 
 __all__ = ["network"]
 
@@ -57,7 +57,7 @@ def test_example_driver_runs_as_a_separate_process(network):
     process = start(str(EXAMPLE), "--name", "Table", network=network)
     try:
         with nep.node("me", master=network) as node:
-            message = node.new_sub("/Table/description", "robot/description").receive(15.0)
+            message = node.new_sub("/Table/description", "robot/description").receive(LONG_S)
             assert message is not None
             table = parse(message.payload)
             assert [action.name for action in table.actions] == ["turn", "blink", "stop"]

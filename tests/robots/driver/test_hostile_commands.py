@@ -215,8 +215,8 @@ def test_stop_works_after_the_thread_of_the_stop_function_was_killed(turtle):
         assert body.stops >= count
 
 
-def test_stops_from_many_threads_are_each_answered_once(node):
-    with Driver(TURTLE, "Other", node) as driver:
+def test_stops_from_many_threads_are_each_answered_once(node, clock):
+    with Driver(TURTLE, "Other", node, clock=clock) as driver:
         answers: list[str] = []
 
         def stop() -> None:
@@ -233,8 +233,8 @@ def test_stops_from_many_threads_are_each_answered_once(node):
 
 
 @pytest.mark.parametrize("error", [ValueError(), RecursionError(), MemoryError(), SystemExit(3)], ids=repr)
-def test_exception_in_a_queued_call_is_counted_and_the_next_call_runs(node, error, caplog):
-    with Driver(TURTLE, "Other", node) as driver:
+def test_exception_in_a_queued_call_is_counted_and_the_next_call_runs(node, clock, error, caplog):
+    with Driver(TURTLE, "Other", node, clock=clock) as driver:
 
         def fail() -> None:
             raise error

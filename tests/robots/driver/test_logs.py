@@ -5,10 +5,14 @@ from __future__ import annotations
 import logging
 import threading
 
+import pytest
+
 import nep
 from app.robots.driver.process import run
 from app.robots.kit import Call, Kind, Link, action, safe_stop
 from tests.robots.conftest import eventually
+
+pytestmark = pytest.mark.usefixtures("patient")  # records and commands are published once
 
 
 class Clumsy:
@@ -42,7 +46,7 @@ def test_driver_log_records_and_exceptions_are_published(master):
         )
         eventually(lambda: any("no legs" in record["text"] for record in records))
         ended.set()
-        robot.join(10)
+        robot.join(60)
     (broke,) = [record for record in records if "no legs" in record["text"]]
     assert broke["level"] == "warning"
     assert "Traceback" in broke["text"]

@@ -20,7 +20,9 @@ from app.robots.virtual.lens import Lens
 from app.robots.virtual.room import Room
 from app.robots.virtual.vision import colours_in
 from app.robots.virtual.wheels import BRAKING, PRESS_DURATION_S, RADIUS, START_POSE, WheelBody
-from tests.robots.conftest import Ears, eventually
+from tests.robots.conftest import Ears, FakeClock, eventually
+
+WATCHDOG_S = 0.5
 
 
 def near(value: float, expected: float, within: float) -> bool:
@@ -145,6 +147,17 @@ def turtle(node: nep.Node):
         yield driver.body, ears
 
 
+@pytest.fixture
+def watched_turtle(node: nep.Node, clock: FakeClock):
+    """Turtle whose watchdog has the clock of the test, its listener, and the clock."""
+    with nep.node("listener", "memory") as other, Driver(ROBOT, "Turtle", node, clock=clock) as driver:
+        assert driver.robot.safe_stop.watchdog_s == WATCHDOG_S
+        ears = Ears(other, "Turtle")
+        ears.listen("state")
+        eventually(lambda: ears.heard["state"])
+        yield driver.body, ears, clock
+
+
 def pose(ears: Ears) -> tuple[float, float, float]:
     told = ears.heard["pose"][-1]
     return told["x"], told["y"], told["theta"]
@@ -190,24 +203,26 @@ def test_triggered_colour_event_is_validated_against_the_description(turtle) -> 
     assert ears.heard["bump"] == []
 
 
-def test_missing_heartbeat_of_the_program_stops_a_driving_robot(turtle) -> None:
-    body, ears = turtle
+def test_missing_heartbeat_of_the_program_stops_a_driving_robot(watched_turtle) -> None:
+    body, ears, clock = watched_turtle
     ears.invoke("1", "drive", program="test", speed=-0.2, turn=30)
     assert ears.final("1")["state"] == "succeeded"
     eventually(lambda: not body.wheels.is_still())
+    clock.advance(WATCHDOG_S + 0.1)
     eventually(body.wheels.is_still)  # no heartbeat was sent
     assert ears.heard["state"][-1]["figure"] == "turtle"
 
 
-def test_robot_keeps_driving_while_its_program_sends_heartbeats_until_stopped(turtle) -> None:
-    body, ears = turtle
+def test_robot_keeps_driving_while_its_program_sends_heartbeats_until_stopped(watched_turtle) -> None:
+    body, ears, clock = watched_turtle
     ears.invoke("1", "drive", program="test", speed=0.0, turn=60)
     ears.final("1")
-    began = len(ears.heard["pose"])
-    while len(ears.heard["pose"]) < began + 40:  # longer than one second
-        seen = len(ears.heard["pose"])
+    eventually(lambda: not body.wheels.is_still())
+    for number in range(5):
+        clock.advance(0.6 * WATCHDOG_S)
         ears.command(op="alive", id="a", **{"from": "test"})
-        eventually(lambda seen=seen: len(ears.heard["pose"]) > seen)
+        ears.invoke(f"l{number}", "light")
+        ears.final(f"l{number}")  # the heartbeat was processed before
     assert not body.wheels.is_still()
     ears.command(id="s", op="stop")
     assert ears.final("s", "stop")["state"] == "succeeded"
