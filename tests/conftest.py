@@ -190,13 +190,12 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def patient_robots(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Extend the time limits for replies of robots in this process, so that a busy computer doesn't exceed them.
+    """Extend the time limits for replies of robots in this process for busy computers.
 
     A test whose robot doesn't reply shortens them again (`tests.blocks.wire_robot.usual_time_limits`).
     """
-    limits = "app.robots.client.limits."
     for name in ("STOP_TIMEOUT_S", "MAX_STOP_TIMEOUT_S", "FIRST_REPLY_TIMEOUT_S", "MIN_SILENCE_S"):
-        monkeypatch.setattr(limits + name, PATIENCE_S)
+        monkeypatch.setattr(f"app.robots.client.limits.{name}", PATIENCE_S)
     monkeypatch.setattr("app.core.robots.invocations.FIRST_REPLY_TIMEOUT_S", PATIENCE_S)
     monkeypatch.setattr("app.robots.driver.tasks.STOP_REPLY_TIMEOUT_S", PATIENCE_S / 2)
 

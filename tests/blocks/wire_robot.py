@@ -20,14 +20,10 @@ def usual_time_limits() -> Iterator[None]:
 
     They are those of the product, except that other robots get three seconds to confirm a Stop.
     """
-    limits = "app.robots.client.limits."
+    usual = {"STOP_TIMEOUT_S": 3.0, "FIRST_REPLY_TIMEOUT_S": 3.0, "MIN_SILENCE_S": 2.0}
     with pytest.MonkeyPatch.context() as patched:
-        for name, seconds in (
-            ("STOP_TIMEOUT_S", 3.0),
-            ("FIRST_REPLY_TIMEOUT_S", 3.0),
-            ("MIN_SILENCE_S", 2.0),
-        ):
-            patched.setattr(limits + name, seconds)
+        for name, seconds in usual.items():
+            patched.setattr(f"app.robots.client.limits.{name}", seconds)
         patched.setattr("app.core.robots.invocations.FIRST_REPLY_TIMEOUT_S", 3.0)
         yield
 
