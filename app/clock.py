@@ -54,6 +54,23 @@ class ThreadClock(Clock, Protocol):
         ...
 
 
+def poll(clock: ThreadClock, condition: Callable[[], bool], timeout_s: float, interval_s: float) -> bool:
+    """Poll a condition until it is true; return False on timeout.
+
+    Args:
+        clock: Clock of the waits.
+        condition: Condition.
+        timeout_s: Timeout in seconds.
+        interval_s: Interval in seconds between two polls.
+    """
+    deadline_s, never_set = clock.now() + timeout_s, clock.event()
+    while not condition():
+        if clock.now() >= deadline_s:
+            return False
+        clock.wait(never_set, interval_s)
+    return True
+
+
 class MonotonicClock:
     """Monotonic clock of the computer."""
 

@@ -174,7 +174,9 @@ def run(name: str) -> None:
         for claim in discovery.rejected_claims:
             _print(claim)
         owners = {robot: owner.node_id for robot, owner in discovery.owners.items()}
-        network = Network(node, f"program {name}", discovery.robots, owners=owners)
+        network = Network(
+            node, f"program {name}", discovery.robots, owners=owners, clock=_runtime.scheduler.clock
+        )
         try:
             _runtime.start(network, discovery.robots)
             while not _runtime.finished.wait(0.1):

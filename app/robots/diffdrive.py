@@ -11,6 +11,7 @@ import threading
 from collections.abc import Callable, Mapping
 from typing import Annotated, Literal, Protocol
 
+from app.clock import poll
 from app.robots.driver.call import Call, Canceled, Failed, Link
 from app.robots.driver.common_actions import (
     MOVEMENT,
@@ -32,6 +33,7 @@ DECELERATION, TURN_DECELERATION = 0.5, 200.0  # m/s², °/s²
 DISTANCE_TOLERANCE_M, ANGLE_TOLERANCE_DEG = 0.008, 0.8
 MIN_DISTANCE_M = 0.03
 STANDSTILL_TIMEOUT_S = 1.0
+_STANDSTILL_POLL_S = 0.005
 MAX_DISTANCE_M = 5.0
 
 Distance = Annotated[float, Range(-MAX_DISTANCE_M, MAX_DISTANCE_M, 0.05, "m")]
@@ -175,12 +177,8 @@ class DiffDrive:
         """Brake and return when the robot stands still. Raises Failed if the wheels still turn after 1 s."""
         with self._steering:  # running actions are canceled and don't steer any more
             self.wheels.drive(0.0, 0.0)
-        never_set = threading.Event()
-        for _attempt in range(round(STANDSTILL_TIMEOUT_S / 0.005)):
-            if self.wheels.is_still():
-                return
-            never_set.wait(0.005)
-        raise Failed(_("its wheels keep turning"))
+        if not poll(self.link.clock, self.wheels.is_still, STANDSTILL_TIMEOUT_S, _STANDSTILL_POLL_S):
+            raise Failed(_("its wheels keep turning"))
 
     # ---- steering ---------------------------------------------------------------------------------
 

@@ -30,7 +30,7 @@ Example:
 
 from __future__ import annotations
 
-from app.clock import Clock, MonotonicClock
+from app.clock import Clock, MonotonicClock, ThreadClock
 from app.robots.driver.call import Call, Canceled, Failed, Link
 from app.robots.driver.declare import Kind, action, detections, event, picture, safe_stop, sensor
 from app.robots.driver.driver import Driver
@@ -41,6 +41,6 @@ install_exception_hook()
 
 __all__ = [
     "Advanced", "Call", "Canceled", "Clock", "Colour", "Driver", "Failed", "Image", "Kind", "Link",
-    "MonotonicClock", "Range", "Suggested", "Text", "Title", "Words", "action", "detections", "event",
-    "main", "picture", "safe_stop", "sensor",
+    "MonotonicClock", "Range", "Suggested", "Text", "ThreadClock", "Title", "Words", "action", "detections",
+    "event", "main", "picture", "safe_stop", "sensor",
 ]  # fmt: skip

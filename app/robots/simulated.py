@@ -80,7 +80,7 @@ class VirtualPepper(SimulatedRobot):
         language: Language = "en",
     ) -> Mapping[str, object]:
         """Say something. A speech bubble shows the text while the robot speaks."""
-        with self._simulation.changed:
+        with self._simulation.lock:
             body = self._simulation.body
             body.volume, body.language = volume, language
             speech = body.speak(text)
@@ -89,7 +89,7 @@ class VirtualPepper(SimulatedRobot):
             while not call.until(lambda: speech.done, for_s=FEEDBACK_INTERVAL_S):
                 call.feedback(word=speech.word)
         except Canceled:
-            with self._simulation.changed:
+            with self._simulation.lock:
                 if not speech.done:
                     self._simulation.body.stop_audio()
             raise
@@ -126,7 +126,7 @@ class VirtualPepper(SimulatedRobot):
         self._play(call, f"{frequency:g} Hz", ((frequency, seconds),), volume)
 
     def _play(self, call: Call, title: str, notes: Notes, volume: int) -> None:
-        with self._simulation.changed:
+        with self._simulation.lock:
             body = self._simulation.body
             body.volume = volume
             sound = body.play(title, notes)
@@ -184,7 +184,7 @@ class VirtualPepper(SimulatedRobot):
     @moves("look at %target", "eye", "looks at %target", "head", timeout_s=10, title="look at")
     def look_at(self, call: Call, target: Target = "face") -> None:
         """Turn the head in a direction, or to the face or ball in the picture."""
-        with self._simulation.changed:
+        with self._simulation.lock:
             yaw, pitch = self._head_angles_to(target)
         self._turn_head(call, yaw, pitch)
 
@@ -208,14 +208,14 @@ class VirtualPepper(SimulatedRobot):
     @moves("wave %hand hand", "hand", "waves its %hand hand", "arms", timeout_s=20, rize="wave")
     def wave(self, call: Call, hand: Side = "right") -> None:
         """Wave one hand."""
-        with self._simulation.changed:
+        with self._simulation.lock:
             wave = self._simulation.body.wave(hand)
         self._wait_until(call, lambda: wave.done, wave.halt)
 
     @moves("stand straight", "person-standing", "stands straight", "arms", "head", timeout_s=10)
     def stand(self, call: Call) -> None:
         """Lower the arms and look straight ahead."""
-        with self._simulation.changed:
+        with self._simulation.lock:
             self._simulation.body.stand()
         self._wait_until(
             call, lambda: self._simulation.body.are_joints_at_target, self._simulation.body.stop_joints
@@ -241,12 +241,12 @@ class VirtualPepper(SimulatedRobot):
         seconds: Annotated[float, Range(0.5, 60, 0.5, "s")] = 2.0,
     ) -> None:
         """Show an emotion for some time."""
-        with self._simulation.changed:
+        with self._simulation.lock:
             self._simulation.body.emotion = emotion
         try:
             call.wait(seconds)
         finally:
-            with self._simulation.changed:
+            with self._simulation.lock:
                 self._simulation.body.emotion = "neutral"
 
     @action(
@@ -266,7 +266,7 @@ class VirtualPepper(SimulatedRobot):
         colour: Colour = "#35b0fa",
     ) -> None:
         """Set the colour of the lights."""
-        with self._simulation.changed:
+        with self._simulation.lock:
             if where in {"eyes", "both"}:
                 self._simulation.body.eyes = colour
             if where in {"shoulders", "both"}:
@@ -280,7 +280,7 @@ class VirtualPepper(SimulatedRobot):
 
         Raises Failed if the robot still moves after 2 s.
         """
-        with self._simulation.changed:
+        with self._simulation.lock:
             self._simulation.body.halt()
         if not self._simulation.wait_for(lambda: self._simulation.body.is_still, timeout_s=2.0):
             raise Failed(_("the virtual robot keeps moving"))

@@ -13,7 +13,6 @@ from dataclasses import replace
 
 import cv2
 
-from app.clock import Clock, MonotonicClock
 from app.robots.description.json_access import finite_float
 from app.robots.diffdrive import DIFFDRIVE, DiffDrive
 from app.robots.driver.call import Link
@@ -42,30 +41,26 @@ class VirtualWheels:
 
     Args:
         link: Connection to the network.
-        clock: Clock of the simulation.
     """
 
-    def __init__(self, link: Link, clock: Clock) -> None:
+    def __init__(self, link: Link) -> None:
         self.body = WheelBody()
-        self._link, self._clock = link, clock
+        self._link, self._clock = link, link.clock
         self._lock = threading.Lock()
-        self._ended = threading.Event()
+        self._ended = self._clock.event()
         self._camera = Camera(self.body.room)
         self._visible_colours: set[str] = set()
         appearance = OtherRobot(link.name, 0.0, 0.0, 0.0, RADIUS, HEIGHT, "turtle")
-        self._shared = SharedRoom(link, clock, self.body, self._lock, appearance)
-        self._last_step_s = clock.now()
-        self._threads = [
-            threading.Thread(target=self._run_body, name=f"{link.name} wheels", daemon=True),
-            threading.Thread(target=self._run_camera, name=f"{link.name} camera", daemon=True),
-        ]
+        self._shared = SharedRoom(link, self.body, self._lock, appearance)
+        self._last_step_s = self._clock.now()
+        self._threads: list[threading.Thread] = []
         link.on_world(self.apply_change)
 
     def start(self) -> None:
         """Start both threads."""
         cv2.setNumThreads(1)
-        for thread in self._threads:
-            thread.start()
+        for target, label in ((self._run_body, "wheels"), (self._run_camera, "camera")):
+            self._threads.append(self._clock.start_thread(target, f"{self._link.name} {label}"))
 
     # ---- Wheels interface --------------------------------------------------------------------------------
 
@@ -103,8 +98,7 @@ class VirtualWheels:
         """Stop both threads."""
         self._ended.set()
         for thread in self._threads:
-            if thread.is_alive():
-                thread.join(_JOIN_TIMEOUT_S)
+            thread.join(_JOIN_TIMEOUT_S)
 
     # ---- threads ----------------------------------------------------------------------------------
 
@@ -203,7 +197,7 @@ class VirtualTurtle(DiffDrive):
     """Virtual two-wheeled robot in its room."""
 
     def __init__(self, link: Link) -> None:
-        wheels = VirtualWheels(link, MonotonicClock())
+        wheels = VirtualWheels(link)
         super().__init__(link, wheels)
         self._wheels = wheels
         wheels.start()

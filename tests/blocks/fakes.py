@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+import time
 from collections.abc import Callable, Mapping
 
 from app.blocks.compiler.compiler import compile_behaviour
@@ -42,7 +44,7 @@ class FakeLink:
 
     def invoke(self, robot: str, action: str, input: Mapping[str, object]) -> RobotCall:
         self.invoked.append((robot, action, dict(input)))
-        call = RobotCall(f"c{len(self.calls)}", robot, action)
+        call = RobotCall(f"c{len(self.calls)}", robot, action, started_s=time.monotonic())
         self.calls.append(call)
         if action in self.held:
             call.state = "running"
@@ -146,9 +148,6 @@ def play(workspace: Mapping[str, object], link: FakeLink | None = None) -> Play:
 
 def until(ready: Callable[[], bool], timeout_s: float = LONG_S) -> None:
     """Wait until a condition holds; fail after `timeout_s` seconds."""
-    import threading
-    import time
-
     waiting, deadline = threading.Event(), time.monotonic() + timeout_s
     while not ready():
         assert time.monotonic() < deadline, "it has not happened"

@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 import pytest
 
 import nep
+from app.clock import VirtualClock
 from app.robots.kit import (
     Call,
     Canceled,
@@ -35,35 +36,6 @@ def eventually(true: Callable[[], object], timeout_s: float = 60.0) -> None:
     while not true():
         assert time.monotonic() < end, "it never came true"
         never.wait(0.002)
-
-
-class FakeClock:
-    """Clock that advances only when the test calls `advance`.
-
-    A thread that reads the time and then waits for a duration waits from the time that it read: a test
-    may advance the clock in between.
-    """
-
-    def __init__(self) -> None:
-        self._now = 100.0
-        self._told = threading.local()
-
-    def now(self) -> float:
-        self._told.now = now = self._now
-        return now
-
-    def advance(self, seconds: float) -> None:
-        self._now += seconds
-
-    def wait(self, event: threading.Event, timeout_s: float | None) -> bool:
-        began = getattr(self._told, "now", self._now)
-        if hasattr(self._told, "now"):
-            del self._told.now
-        end = None if timeout_s is None else began + timeout_s
-        while not event.wait(0.001):
-            if end is not None and self._now >= end:
-                return False
-        return True
 
 
 class Turtle:
@@ -206,8 +178,9 @@ class Ears:
 
 
 @pytest.fixture
-def clock() -> FakeClock:
-    return FakeClock()
+def clock() -> VirtualClock:
+    """Clock that advances only when the test calls `advance`."""
+    return VirtualClock(advances_alone=False)
 
 
 @pytest.fixture
@@ -217,7 +190,7 @@ def node() -> Iterator[nep.Node]:
 
 
 @pytest.fixture
-def turtle(node: nep.Node, clock: FakeClock) -> Iterator[tuple[Turtle, Ears, FakeClock]]:
+def turtle(node: nep.Node, clock: VirtualClock) -> Iterator[tuple[Turtle, Ears, VirtualClock]]:
     """Running turtle, a client of it, and the fake clock of its driver."""
     with nep.node("listener", "memory") as other:
         ears = Ears(other, "Turtle")

@@ -21,7 +21,6 @@ import queue
 import signal
 import sys
 import threading
-import time
 import uuid
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
@@ -168,7 +167,7 @@ class Run:
         )
         self._network: Network | None = None
         self._variables = VariableWatch({}, ())
-        self._started_at = time.monotonic()
+        self._started_at = self._runtime.scheduler.clock.now()
         self._stop_timeout_s: float | None = None
         self.set_pace(command)
         self._starts_paused = command.get("paused") is True
@@ -248,7 +247,7 @@ class Run:
             self._send_replacements()
             self._out.send_printed()
             self._send_variables()
-            elapsed_s = round(time.monotonic() - self._started_at, 3)
+            elapsed_s = round(self._runtime.scheduler.clock.now() - self._started_at, 3)
             self._out.send(
                 ProgramEnded(is_ok=error is None, elapsed_s=elapsed_s, unresponsive_robots=silent_robots)
             )
@@ -260,11 +259,11 @@ class Run:
             node,
             self._id,
             self._robots,
-            sensors=self._program.sensors,
-            events=self._program.events,
+            parts=(*self._program.sensors, *self._program.events),
             publishes=self._program.publishes,
             listens=self._program.listens,
             owners=self._owners,
+            clock=self._runtime.scheduler.clock,
         )
         network.guard = self._guard
         self._network = network
@@ -281,7 +280,7 @@ class Run:
             self._variables = VariableWatch(names, self._program.variables)
             code = compile(self._program.runnable, "<behaviour>", "exec")
             exec(code, names)  # noqa: S102 (the compiler's own tree: texts of files are literals only)
-            self._started_at = time.monotonic()
+            self._started_at = self._runtime.scheduler.clock.now()
             self._runtime.start(network, self._robots)
             self._report_until_finished()
         finally:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -17,11 +16,15 @@ class RobotCall(RobotTask):
 
     Attributes:
         is_canceled_by_pause: True if a pause cancelled the command.
-        last_reply_s: Time of the robot's last reply to this program (monotonic seconds).
+        last_reply_s: Time of the robot's last reply to this program on the program's clock; before the first
+            reply, the time at which the command was sent.
     """
 
     is_canceled_by_pause: bool = False
-    last_reply_s: float = field(default_factory=time.monotonic)
+    last_reply_s: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.last_reply_s = self.started_s
 
     @property
     def done(self) -> bool:

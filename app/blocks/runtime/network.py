@@ -13,6 +13,7 @@ from app.blocks.runtime.link import RobotCall
 from app.blocks.runtime.motions import Motions
 from app.blocks.runtime.publishing import PublishGuard
 from app.blocks.runtime.scheduler import ScriptGroup
+from app.clock import MonotonicClock, ThreadClock
 from app.robots.client.dialects import dialect_of, new_id
 from app.robots.client.heartbeat import Heartbeat
 from app.robots.client.inbox import ReplyInbox, Senders
@@ -93,12 +94,12 @@ class Network:
         node: Node of the program.
         program: Id of the program, sent with its commands.
         robots: Descriptions of the program's robots.
-        sensors: Used sensors as (robot, name).
-        events: Used events as (robot, name).
+        parts: Used sensors and events as (robot, name).
         publishes: Topics to publish on; other topics are opened at first use.
         listens: Topics to subscribe to; other topics are opened at first use.
         owners: Node ids by robot name; replies of other nodes are ignored. The default for each robot is the
             first node that announced it.
+        clock: Clock of the program (default: that of the computer). Stops are timed by the computer's clock.
     """
 
     def __init__(
@@ -107,13 +108,14 @@ class Network:
         program: str,
         robots: Sequence[Robot],
         *,
-        sensors: Iterable[tuple[str, str]] = (),
-        events: Iterable[tuple[str, str]] = (),
+        parts: Iterable[tuple[str, str]] = (),
         publishes: Iterable[str] = (),
         listens: Iterable[str] = (),
         owners: Mapping[str, str] | None = None,
+        clock: ThreadClock | None = None,
     ) -> None:
         self._node = node
+        self._clock: ThreadClock = clock or MonotonicClock()
         self.guard = PublishGuard({}, ())
         """Guard of the topics on which the program may not publish."""
         self._owners = dict(owners or {})
@@ -121,7 +123,7 @@ class Network:
         self._view = GraphView(0, 0)
         self._replies_lock = threading.Lock()  # serializes the handling of replies
         self._inbox = ReplyInbox(self._senders)
-        self._lookup_requested = threading.Event()
+        self._lookup_requested = self._clock.event()
         self._lookup_thread: threading.Thread | None = None
         self._program = program
         self._robots = {robot.name: robot for robot in robots}
@@ -138,12 +140,12 @@ class Network:
         self._on_change: Callable[[], None] = _do_nothing
         self._on_external_stop: Callable[[str], None] = _ignore
         self._stops_changed = threading.Condition()
-        self._closed = threading.Event()
+        self._closed = self._clock.event()
         self._errors = SuppressedErrors(_log, "a message or reply of a robot")
         self._is_ending = False
         self._motions = Motions(self._stop_for_pause, self._stop_motion, self.invoke)
-        self._heartbeat = Heartbeat(program, "program alive")
-        self._open((*sensors, *events), publishes, listens)
+        self._heartbeat = Heartbeat(program, "program alive", self._clock)
+        self._open(parts, publishes, listens)
 
     def _open(
         self, parts: Iterable[tuple[str, str]], publishes: Iterable[str], listens: Iterable[str]
@@ -200,7 +202,7 @@ class Network:
     def invoke(self, robot: str, action: str, input: Mapping[str, object]) -> RobotCall:
         """Send a command to a robot; the returned call is updated as replies arrive."""
         description = self._robots[robot]
-        call = RobotCall(new_id("cmd"), robot, action, started_s=time.monotonic())
+        call = RobotCall(new_id("cmd"), robot, action, started_s=self._clock.now())
         with self._lock:
             self._calls[call.id] = call
         self._motions.record_command(call, description, input)
@@ -309,8 +311,11 @@ class Network:
     def stop_robots(self, timeout_s: float | None = None) -> tuple[str, ...]:
         """Stop all robots and wait for their confirmations. Robots that can't confirm (RIZE) are skipped.
 
+        Don't call this in a thread of the clock: robots in virtual time couldn't stop meanwhile.
+
         Args:
-            timeout_s: Maximum wait in seconds; None for the time that the robots' descriptions require.
+            timeout_s: Maximum wait in seconds of real time; None for the time that the robots' descriptions
+                require.
 
         Returns:
             Names of the robots that did not confirm the stop; see `stop_error` for the reasons.
@@ -385,18 +390,15 @@ class Network:
         # Starts the query in a separate thread.
         with self._lock:
             if self._lookup_thread is None and not self._closed.is_set():
-                self._lookup_thread = threading.Thread(
-                    target=self._run_lookup, name="program senders", daemon=True
-                )
-                self._lookup_thread.start()
+                self._lookup_thread = self._clock.start_thread(self._run_lookup, "program senders")
         self._lookup_requested.set()
 
     def _run_lookup(self) -> None:
-        while self._lookup_requested.wait() and not self._closed.is_set():
+        while self._clock.wait(self._lookup_requested, None) and not self._closed.is_set():
             self._lookup_requested.clear()
             with self._errors, suppress(NepError):
                 self._resolve_senders()
-            self._closed.wait(PROGRAM_LOOKUP_INTERVAL_S)
+            self._clock.wait(self._closed, PROGRAM_LOOKUP_INTERVAL_S)
 
     def _is_from_robot(self, message: Message) -> bool:
         owner = self._owners.get(self._robot_of.get(message.topic, ""))
@@ -441,10 +443,9 @@ class Network:
 
     def _handle_reply_locked(self, node: str | None, message: Message) -> None:
         # Call with `_replies_lock` held. Only messages of nodes whose replies count are decoded.
-        now = time.monotonic()
         with self._stops_changed:
             if node is not None and self._stops.is_awaited(message):
-                self._stops.receive(node, message, now)
+                self._stops.receive(node, message, time.monotonic())
             self._stops_changed.notify_all()
         for robot in self._robots.values():
             dialect = dialect_of(robot)
@@ -453,7 +454,7 @@ class Network:
             ):
                 reply = dialect.read(payload_of(message))
                 if reply is not None:
-                    self._apply_reply(robot, reply, now)
+                    self._apply_reply(robot, reply, self._clock.now())
 
     def _apply_reply(self, robot: Robot, reply: RobotReply, now: float) -> None:
         for pending_call in list(self._calls.values()):

@@ -6,6 +6,7 @@ import logging
 import threading
 from collections.abc import Callable, Mapping
 
+from app.clock import MonotonicClock, ThreadClock
 from app.robots.client.dialects import heartbeat
 from app.robots.client.limits import HEARTBEAT_INTERVAL_S
 from nep.errors import NepError
@@ -22,13 +23,15 @@ class Heartbeat:
     Args:
         sender: Id of this program in the messages.
         thread_name: Name of the thread.
+        clock: Clock of the thread (default: that of the computer).
     """
 
-    def __init__(self, sender: str, thread_name: str) -> None:
+    def __init__(self, sender: str, thread_name: str, clock: ThreadClock | None = None) -> None:
         self._sender, self._thread_name = sender, thread_name
+        self._clock: ThreadClock = clock or MonotonicClock()
         self._lock = threading.Lock()
         self._robots: dict[str, Publish] = {}
-        self._changed = threading.Event()
+        self._changed = self._clock.event()
         self._is_closing = False
         self._thread: threading.Thread | None = None
         self._errors = SuppressedErrors(_log, thread_name)
@@ -43,8 +46,7 @@ class Heartbeat:
         with self._lock:
             self._robots[robot] = publish
             if self._thread is None and not self._is_closing:
-                self._thread = threading.Thread(target=self._run, name=self._thread_name, daemon=True)
-                self._thread.start()
+                self._thread = self._clock.start_thread(self._run, self._thread_name)
         self._changed.set()
 
     def stop(self, robot: str) -> None:
@@ -69,7 +71,7 @@ class Heartbeat:
             for publish in robots:
                 with self._errors:  # an error for one robot must not stop the heartbeats to the others
                     self._publish(publish)
-            self._changed.wait(HEARTBEAT_INTERVAL_S if robots else None)
+            self._clock.wait(self._changed, HEARTBEAT_INTERVAL_S if robots else None)
 
     def _publish(self, publish: Publish) -> None:
         try:

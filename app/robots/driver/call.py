@@ -6,9 +6,10 @@ import logging
 import sys
 import threading
 from collections.abc import Awaitable, Callable, Mapping, Sequence
+from functools import partial
 from typing import Protocol
 
-from app.clock import Clock
+from app.clock import ThreadClock
 
 _JOIN_TIMEOUT_S = 2.0
 _log = logging.getLogger(__name__)
@@ -53,9 +54,12 @@ class Link(Protocol):
 
     Attributes:
         name: Name of the robot.
+        clock: Clock of the robot's waits and threads. A virtual robot that uses no other clock can be
+            rehearsed in virtual time.
     """
 
     name: str
+    clock: ThreadClock
 
     def sense(self, sensor: str, value: object) -> None:
         """Publish the value of a sensor.
@@ -143,11 +147,13 @@ class Call:
         report: Publishes the progress of the action.
     """
 
-    def __init__(self, action: str, clock: Clock, report: Callable[[Mapping[str, object]], None]) -> None:
+    def __init__(
+        self, action: str, clock: ThreadClock, report: Callable[[Mapping[str, object]], None]
+    ) -> None:
         self.action = action
         self.clock = clock
         self._report = report
-        self._canceled = threading.Event()
+        self._canceled = clock.event()
         self._lock = threading.Lock()
         self._cancel_callbacks: list[Callable[[], object]] = []
         self._cancel_thread: threading.Thread | None = None
@@ -163,13 +169,11 @@ class Call:
             self._canceled.set()
             callbacks, self._cancel_callbacks = self._cancel_callbacks, []
         if callbacks:
-            self._cancel_thread = threading.Thread(
-                target=_run_callbacks, args=(callbacks,), name=f"cancel {self.action}", daemon=True
-            )
             try:
-                self._cancel_thread.start()
+                self._cancel_thread = self.clock.start_thread(
+                    partial(_run_callbacks, callbacks), f"cancel {self.action}"
+                )
             except (RuntimeError, MemoryError):  # out of threads
-                self._cancel_thread = None
                 _run_callbacks(callbacks)
 
     def close(self) -> None:

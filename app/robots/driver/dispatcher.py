@@ -13,7 +13,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 
-from app.clock import Clock
+from app.clock import ThreadClock
 from nep.system.log_rarely import SuppressedErrors
 
 _MAX_CALLS_PER_TICK = 100  # a flood of callbacks must not keep timers waiting
@@ -31,7 +31,7 @@ class Dispatcher:
 
     Args:
         name: Name of the thread.
-        clock: Clock with which the thread waits.
+        clock: Clock of the thread.
         tick: Called in the thread after callbacks, and when the time of ``next_due_s`` has elapsed.
         next_due_s: Returns the seconds until ``tick`` is needed, or None.
         on_restart: Called in the thread before a loop that ended is started again.
@@ -40,7 +40,7 @@ class Dispatcher:
     def __init__(
         self,
         name: str,
-        clock: Clock,
+        clock: ThreadClock,
         *,
         tick: Callable[[], object] = _do_nothing,
         next_due_s: Callable[[], float | None] = lambda: None,
@@ -52,13 +52,13 @@ class Dispatcher:
         self._tick, self._next_due_s, self._on_restart = tick, next_due_s, on_restart
         self._urgent: deque[Callable[[], object]] = deque()
         self._callbacks: deque[Callable[[], object]] = deque()
-        self._wake = threading.Event()
+        self._wake = clock.event()
         self._closing = threading.Event()
-        self._thread = self._new_thread()
+        self._thread: threading.Thread | None = None
 
     def start(self) -> None:
         """Start the thread."""
-        self._thread.start()
+        self._start_thread()
 
     def post(self, callback: Callable[[], object]) -> None:
         """Run a callback in the thread, after the callbacks that were posted before."""
@@ -102,15 +102,16 @@ class Dispatcher:
         """Stop the thread and wait at most 2 s for it; pending callbacks are dropped."""
         self._closing.set()
         self._wake.set()
-        if self._thread.ident is not None and not self.is_current:
+        if self._thread is not None and not self.is_current:
             self._thread.join(_JOIN_TIMEOUT_S)
 
-    def _new_thread(self, *, is_restart: bool = False) -> threading.Thread:
+    def _start_thread(self, *, is_restart: bool = False) -> None:
         supervise = partial(self._supervise, is_restart=is_restart)
-        return threading.Thread(target=supervise, name=self._name, daemon=True)
+        self._thread = self._clock.start_thread(supervise, self._name)
 
     def _supervise(self, *, is_restart: bool = False) -> None:
         try:
+            self._thread = threading.current_thread()  # for callbacks that run before `_start_thread` returns
             while not self._closing.is_set():
                 try:
                     if is_restart:
@@ -122,8 +123,7 @@ class Dispatcher:
                     self.errors.add(error)
         finally:
             if not self._closing.is_set():  # an exception hit the handler above
-                self._thread = self._new_thread(is_restart=True)
-                self._thread.start()
+                self._start_thread(is_restart=True)
 
     def _loop(self) -> None:
         while not self._closing.is_set():

@@ -15,7 +15,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import nep
-from app.clock import Clock, MonotonicClock
+from app.clock import MonotonicClock, ThreadClock
 from app.errors import DescriptionError, RobotValueError
 from app.robots.description.description import MAX_BYTES, parse, thing_description, topic_of
 from app.robots.description.inputs import input_problems
@@ -51,13 +51,13 @@ class Driver:
         kind: Kind of the robot.
         name: Name of the robot, which is the first level of its topics.
         node: Node for publishers and subscribers.
-        clock: Clock, replaceable in tests.
+        clock: Clock of the waits and threads of the driver and its robot (default: that of the computer).
 
     Raises:
         DescriptionError: The name is invalid, or the description is too large.
     """
 
-    def __init__(self, kind: Kind, name: str, node: nep.Node, *, clock: Clock | None = None) -> None:
+    def __init__(self, kind: Kind, name: str, node: nep.Node, *, clock: ThreadClock | None = None) -> None:
         self.name = name
         self.kind = kind
         self.description = thing_description(kind.thing_model, name)
@@ -68,7 +68,7 @@ class Driver:
                 (_("it exceeds the limit of {limit} MB").format(limit=number(MAX_BYTES / 1000000.0, ".0f")),),
             )
         self._node = node
-        self.clock = clock or MonotonicClock()
+        self.clock: ThreadClock = clock or MonotonicClock()
         self._lock = threading.Lock()
         self._publishers: dict[str, nep.Publisher] = {}
         self._subscribers: list[nep.Subscriber] = []

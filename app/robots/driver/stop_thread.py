@@ -6,7 +6,7 @@ import logging
 import threading
 from collections.abc import Callable
 
-from app.clock import Clock
+from app.clock import ThreadClock
 from app.robots.driver.call import Failed
 from app.robots.identity import MAX_ERROR_LENGTH, MAY_MOVE_MESSAGE
 from nep.i18n import _
@@ -26,7 +26,7 @@ class StopThread:
         name: Name of the robot.
         stop: Stop function of the robot.
         on_end: Called in this thread after each run, with its number and its error message, or None.
-        clock: Clock with which the thread waits.
+        clock: Clock of the thread.
     """
 
     def __init__(
@@ -34,19 +34,19 @@ class StopThread:
         name: str,
         stop: Callable[[], object],
         on_end: Callable[[int, str | None], object],
-        clock: Clock,
+        clock: ThreadClock,
     ) -> None:
         self._name, self._stop, self._on_end, self._clock = name, stop, on_end, clock
         self._errors = SuppressedErrors(_log, f"{name} stop")
         self._lock = threading.Lock()
-        self._wake = threading.Event()
+        self._wake = clock.event()
         self._is_closing = False
         self._requested_run = self._finished_run = 0
-        self._thread = self._new_thread()
+        self._thread: threading.Thread | None = None
 
     def start(self) -> None:
         """Start the thread."""
-        self._thread.start()
+        self._thread = self._clock.start_thread(self._supervise, f"{self._name} stop")
 
     @property
     def requested_run(self) -> int:
@@ -71,11 +71,8 @@ class StopThread:
         """Stop the thread. A stop function that doesn't return within 0.5 s is abandoned."""
         self._is_closing = True
         self._wake.set()
-        if self._thread.ident is not None:
+        if self._thread is not None:
             self._thread.join(_JOIN_TIMEOUT_S)
-
-    def _new_thread(self) -> threading.Thread:
-        return threading.Thread(target=self._supervise, name=f"{self._name} stop", daemon=True)
 
     def _supervise(self) -> None:
         try:
@@ -88,9 +85,8 @@ class StopThread:
                         self._run(self._requested_run)
         finally:
             if not self._is_closing:  # an exception was injected outside of the try block
-                self._thread = self._new_thread()
                 self._wake.set()
-                self._thread.start()
+                self.start()
 
     def _run(self, run: int) -> None:
         error: str | None = _(MAY_MOVE_MESSAGE).format(robot=self._name, why=_("the stop command failed"))

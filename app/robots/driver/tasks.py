@@ -14,7 +14,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple
 
-from app.clock import Clock
+from app.clock import ThreadClock
 from app.robots.driver.call import Call, Canceled, Failed
 from app.robots.driver.dispatcher import Dispatcher
 from app.robots.driver.stop_thread import StopThread
@@ -133,7 +133,7 @@ class Tasks:
     Args:
         name: Name of the robot.
         stop: Stop function of the robot.
-        clock: Clock.
+        clock: Clock of the tasks and their threads.
         within_s: Time in seconds within which the robot stops.
         watchdog_s: Maximum time between heartbeats of a program in seconds; None disables the watchdog.
         send_heartbeat: Sends a heartbeat. Called every `HEARTBEAT_INTERVAL_S` while a task is running or
@@ -146,7 +146,7 @@ class Tasks:
         self,
         name: str,
         stop: Callable[[], object],
-        clock: Clock,
+        clock: ThreadClock,
         *,
         within_s: float,
         watchdog_s: float | None,
@@ -490,12 +490,11 @@ class Tasks:
         task.deadline_s = None if task.timeout_s is None else self._clock.now() + task.timeout_s
         self._watchdog.record_start(task)
         self._send_reply(task.reply, TaskReply("running"))
-        name = f"{self._name} {task.action}"
-        task.thread = threading.Thread(target=self._run_task, args=(task, call), name=name, daemon=True)
         try:
-            task.thread.start()
+            task.thread = self._clock.start_thread(
+                partial(self._run_task, task, call), f"{self._name} {task.action}"
+            )
         except (RuntimeError, MemoryError) as error:  # out of threads
-            task.thread = None
             self._finish_task(task, TaskReply("failed", error=self._failure_message(task, error)))
 
     def _report_progress(self, task: Task, values: dict[str, object]) -> None:

@@ -199,6 +199,7 @@ class Body:
             self._base_motion.halt()
         for wave in self._waves:
             wave.halt()
+        self._waves.clear()
         self.stop_joints()
         self.stop_audio()
         self.emotion = "neutral"

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Annotated, ClassVar, Literal, TypeAlias
 
-from app.clock import MonotonicClock
 from app.robots.driver.call import Call, Canceled, Failed, Link
 from app.robots.driver.common_actions import battery_sensor, distance_sensor, position_sensor
 from app.robots.driver.declare import EventSpec, detections, event, picture, sensor
@@ -97,7 +96,7 @@ class SimulatedRobot(SensorDeclarations):
     start_room: ClassVar[Room] = Room()
 
     def __init__(self, link: Link) -> None:
-        self._simulation = Simulation(Body(room=self.start_room), link, MonotonicClock())
+        self._simulation = Simulation(Body(room=self.start_room), link)
         link.on_world(self._simulation.apply_change)
         self._simulation.start()
 
@@ -106,7 +105,7 @@ class SimulatedRobot(SensorDeclarations):
         self._simulation.close()
 
     def _run_motion(self, call: Call, start: Callable[[Body], Motion]) -> Motion:
-        with self._simulation.changed:
+        with self._simulation.lock:
             motion = start(self._simulation.body)
         try:
             while not call.until(lambda: motion.done, for_s=FEEDBACK_INTERVAL_S):
@@ -118,12 +117,12 @@ class SimulatedRobot(SensorDeclarations):
         return motion
 
     def _brake(self, motion: Motion) -> None:
-        with self._simulation.changed:
+        with self._simulation.lock:
             motion.halt()
         self._simulation.wait_for(lambda: motion.done, timeout_s=1.0)
 
     def _turn_head(self, call: Call, yaw: float, pitch: float) -> None:
-        with self._simulation.changed:
+        with self._simulation.lock:
             self._simulation.body.head_yaw.set_target(yaw)
             self._simulation.body.head_pitch.set_target(pitch)
         self._wait_until(
@@ -148,6 +147,6 @@ class SimulatedRobot(SensorDeclarations):
         try:
             call.until(is_done)
         except Canceled:
-            with self._simulation.changed:
+            with self._simulation.lock:
                 halt()
             raise

@@ -7,7 +7,6 @@ from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import Protocol
 
-from app.clock import Clock
 from app.robots.driver.call import Link
 from app.robots.virtual.neighbours import Neighbours
 from app.robots.virtual.room import OtherRobot, Room
@@ -41,7 +40,6 @@ class SharedRoom:
 
     Args:
         link: Connection to the network.
-        clock: Monotonic clock.
         body: Body of this robot.
         lock: Lock that guards the body.
         appearance: Size and appearance of this robot, as seen by other robots.
@@ -50,7 +48,6 @@ class SharedRoom:
     def __init__(
         self,
         link: Link,
-        clock: Clock,
         body: RoomBody,
         lock: AbstractContextManager[object],
         appearance: OtherRobot,
@@ -59,13 +56,13 @@ class SharedRoom:
             body,
             lock,
             replace(appearance, name=link.name),
-            clock,
+            link.clock,
         )
         self._map = RoomMap(body.room)
-        self._neighbours = Neighbours(link.name, clock)
+        self._neighbours = Neighbours(link.name, link.clock)
         self._revision = self._map.revision
         self._has_unpublished_changes = body.room != Room()
-        self._arrival_end_s = clock.now() + ARRIVAL_PERIOD_S
+        self._arrival_end_s = link.clock.now() + ARRIVAL_PERIOD_S
         self._start = body.x, body.y
         self._returning_names: frozenset[str] = frozenset()
         self._publish_room = link.open_shared_topic(TOPIC, self._receive_room, latched=True)

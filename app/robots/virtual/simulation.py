@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import cv2
 
-from app.clock import Clock
+from app.clock import Clock, poll
 from app.robots.description.json_access import finite_float
 from app.robots.driver.call import Link
 from app.robots.virtual.body import HEIGHT, RADIUS, Body, BodyEvent
@@ -51,33 +51,29 @@ class Simulation:
     """Simulation of the virtual Pepper in two threads, which publishes its sensors, events and state.
 
     Attributes:
-        body: Body, guarded by `changed`.
-        changed: Condition that is notified after each step.
+        body: Body, guarded by `lock`.
+        lock: Lock of the body.
         latest_detections: Newest detections by name of the sensor.
 
     Args:
         body: Body in its room.
         link: Connection to the network.
-        clock: Monotonic clock.
     """
 
-    def __init__(self, body: Body, link: Link, clock: Clock) -> None:
+    def __init__(self, body: Body, link: Link) -> None:
         self.body = body
-        self.changed = threading.Condition()  # guards the body; notified after each step
+        self.lock = threading.RLock()
         self.latest_detections: Mapping[str, list[Detection]] = {}
-        self._link, self._clock = link, clock
+        self._link, self._clock = link, link.clock
         self._camera, self._detector = Camera(body.room), ObjectDetector()
         appearance = OtherRobot(link.name, body.x, body.y, body.theta_deg, RADIUS, HEIGHT)
-        self._shared = SharedRoom(link, clock, body, self.changed, appearance)
+        self._shared = SharedRoom(link, body, self.lock, appearance)
         self._view: _View | None = None
-        self._ended = threading.Event()
-        self._last_step_s = clock.now()
+        self._ended = self._clock.event()
+        self._last_step_s = self._clock.now()
         self._face: str | None = None
         self._face_seen_s = 0.0
-        self._threads = [
-            threading.Thread(target=self._run_body, name=f"{link.name} body", daemon=True),
-            threading.Thread(target=self._run_camera, name=f"{link.name} camera", daemon=True),
-        ]
+        self._threads: list[threading.Thread] = []
 
     def start(self) -> None:
         """Detect the objects in view, then start both threads."""
@@ -85,8 +81,8 @@ class Simulation:
         # Before the camera thread's first image, so that an action of the first moment finds its target.
         self._view = self._render(self.body.room, lens_of(self.body))
         self.latest_detections = self._view.detections
-        for thread in self._threads:
-            thread.start()
+        for target, label in ((self._run_body, "body"), (self._run_camera, "camera")):
+            self._threads.append(self._clock.start_thread(target, f"{self._link.name} {label}"))
 
     def close(self) -> None:
         """Stop both threads."""
@@ -101,14 +97,13 @@ class Simulation:
             condition: Condition, called with the lock held.
             timeout_s: Timeout in seconds.
         """
-        deadline = self._clock.now() + timeout_s
-        with self.changed:
-            while self._clock.now() < deadline:
-                self._advance_locked()
-                if condition():
-                    return True
-                self.changed.wait(_SMALL_STEP_S)
-        return False
+
+        def is_reached() -> bool:
+            with self.lock:
+                self._advance_locked()  # don't wait for the next step of the body thread
+                return condition()
+
+        return poll(self._clock, is_reached, timeout_s, _SMALL_STEP_S)
 
     def _advance_locked(self) -> None:
         # Call with the lock held. Simulates the time since the last step.
@@ -121,14 +116,13 @@ class Simulation:
     # ---- body thread --------------------------------------------------------------------------------
 
     def _run_body(self) -> None:
-        with self.changed:
+        with self.lock:
             self._last_step_s = self._clock.now()
         for step, _ in enumerate(self._ticker(BODY_HZ)):
-            with self.changed:
+            with self.lock:
                 self._advance_locked()
                 events = list(self.body.events)
                 self.body.events.clear()
-                self.changed.notify_all()
             self.publish_step(events, step)
             self._shared.publish_changes()
 
@@ -145,7 +139,7 @@ class Simulation:
                 self._link.sense("head_touched", "head" in self.body.touch_durations_s)
             elif event.name == "heard":
                 self._link.sense("heard_word", self.body.last_word)
-        with self.changed:
+        with self.lock:
             state, distance = drawing_state(self.body), self.body.distance
             pose = {"x": state["x"], "y": state["y"], "theta": state["theta_deg"]}
         self._link.publish_value("state", state)
@@ -175,14 +169,14 @@ class Simulation:
         Args:
             publish: True to publish the image too.
         """
-        with self.changed:
+        with self.lock:
             room, lens = self.body.room, lens_of(self.body)
         if self._view is None or (self._view.room, self._view.lens) != (room, lens):
             self._view = self._render(room, lens)
         picture, detections_by_sensor = self._view.picture, self._view.detections
         if publish:
             self._link.sense("camera", picture)
-        with self.changed:
+        with self.lock:
             self.latest_detections = detections_by_sensor
         for sensor, detections in detections_by_sensor.items():
             self._link.sense(sensor, message(detections, lens))
@@ -226,7 +220,7 @@ class Simulation:
         """
         part, moved_name, word = change.get("touch"), change.get("move"), change.get("say")
         x, y = finite_float(change.get("x")), finite_float(change.get("y"))
-        with self.changed:
+        with self.lock:
             if part in TOUCHABLE_PARTS:
                 self.body.touch(str(part), down=change.get("down") is not False)
             if isinstance(change.get("hold"), bool):
@@ -250,7 +244,7 @@ class Simulation:
         data = {**self._default_event_data(event), **given_data}
         if not is_valid_event(self._link, event, data):
             return
-        with self.changed:
+        with self.lock:
             if event == "heard":
                 self.body.hear(str(data["word"]))
                 return

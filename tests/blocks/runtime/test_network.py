@@ -34,7 +34,7 @@ def network(node, pepper):
         node,
         "program-1",
         [pepper.described],
-        sensors=[("Pepper", "battery")],
+        parts=[("Pepper", "battery")],
         publishes=["/out"],
         listens=["/in"],
     )

@@ -9,10 +9,11 @@ import threading
 import pytest
 
 import nep
+from app.clock import VirtualClock
 from app.robots.driver.driver import Driver, EventLoop
 from app.robots.driver.tasks import STOP_REPLY_TIMEOUT_S
 from app.robots.kit import Call, Failed, Kind, Link, action, safe_stop
-from tests.robots.conftest import Ears, FakeClock, eventually
+from tests.robots.conftest import Ears, eventually
 
 
 async def pause(seconds: float) -> None:
@@ -209,7 +210,12 @@ def test_function_that_returns_an_awaitable_is_awaited(node):
 
     with nep.node("listener", "memory") as other:
         ears = Ears(other, "Wrapped")
-        with Driver(Kind(model="wrapped", title="W", body=Wrapped), "Wrapped", node, clock=FakeClock()):
+        with Driver(
+            Kind(model="wrapped", title="W", body=Wrapped),
+            "Wrapped",
+            node,
+            clock=VirtualClock(advances_alone=False),
+        ):
             ears.invoke("1", "go")
             assert ears.final("1")["state"] == "succeeded"
     assert Wrapped.ran == ["ran"]

@@ -20,6 +20,7 @@ import pytest
 
 import nep
 from app import resources
+from app.clock import VirtualClock
 from app.robots import simulated, turtle
 from app.robots.description.description import Action, Parameter, Robot, parse, validate
 from app.robots.driver.driver import Driver
@@ -27,13 +28,14 @@ from app.robots.identity import program_of
 from app.robots.kit import Kind
 from nep.masters.master import Master
 from tests import hostile
-from tests.robots.conftest import Ears, FakeClock, eventually
+from tests.robots.conftest import Ears, eventually
 from tests.robots.driver.driver_program import ProgramDriver, ProgramKind, program_kind, running_driver
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 MAX_HOSTILE_BYTES = 60_000  # larger messages use shared memory, which outlives the test
 FINAL = {"succeeded", "failed", "canceled"}
 PATIENCE_S = 10.0  # for loaded machines; bench/stop.py measures each stop against its `within`
+BRAKING_STEP_S = 0.005
 
 
 def kinds_in(path: Path) -> list[Kind]:
@@ -132,7 +134,17 @@ class Bench:
     def stop(self, **more: object) -> dict[str, object]:
         wanted = self.new_id()
         self.ears.command(id=wanted, op="stop", **more)
-        return self.ears.final(wanted, "stop", PATIENCE_S + self.robot.safe_stop.within_s)
+        return self.final(wanted, "stop", PATIENCE_S + self.robot.safe_stop.within_s)
+
+    def final(self, wanted: str, op: str = "invoke", timeout_s: float = 30.0) -> dict[str, object]:
+        """Advance the clock while a robot in motion brakes, and return the final reply to a command."""
+
+        def is_ended() -> bool:
+            answers = self.ears.answers(wanted)
+            return any(each["state"] in FINAL and each["op"] == op for each in answers)
+
+        eventually(lambda: is_ended() or self.clock.advance(BRAKING_STEP_S), timeout_s)
+        return self.ears.final(wanted, op)
 
     def finals(self, wanted: str) -> list[dict[str, object]]:
         answers = self.ears.answers(wanted)
@@ -199,7 +211,7 @@ def at_its_start(kind: Kind | ProgramKind, name: str, *, real_clock: bool = Fals
             yield Bench(kind, program, ears, its_clock)
             return
         clock, alone = (
-            FakeClock(),
+            VirtualClock(advances_alone=False),
             f"only {name}",
         )  # separate networks, because robots avoid other robots
         node = opened.enter_context(nep.node("contract", "memory", master=alone))
@@ -332,12 +344,13 @@ def test_cancel_of_an_unknown_task_fails(bench) -> None:
 def test_action_that_exceeds_its_timeout_fails_with_the_limit(shared) -> None:
     late = []
     for action in (each for each in shared.long() if each.timeout_s):
-        # The world keeps its own clock: a robot that moved would no longer see the face in the next action.
+        # A robot that moved would no longer see the face in the next action.
         with at_its_start(shared.kind, f"Late {shared.kind.model}") as bench:
             wanted = bench.invoke(action)
             bench.running(wanted)
             bench.clock.advance(action.timeout_s + 0.1)
-            ended = bench.ears.final(wanted)
+            ended = bench.final(wanted)
+            bench.stop()  # a closing driver doesn't advance the clock
         if ended["state"] == "succeeded":
             continue  # the action finished in that moment
         assert ended["state"] == "failed"
@@ -373,7 +386,7 @@ def test_busy_robot_queues_replaces_or_rejects_actions_as_declared(shared) -> No
 def test_missing_heartbeat_of_the_program_cancels_its_running_action(bench) -> None:
     wanted = bench.begun("silent")
     bench.clock.advance((bench.robot.safe_stop.watchdog_s or 0) + 0.05)
-    ended = bench.ears.final(wanted)
+    ended = bench.final(wanted)
     assert ended["state"] == "canceled"
     assert "hasn't responded" in str(ended["error"])
 

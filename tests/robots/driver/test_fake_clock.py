@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import threading
 
-from tests.robots.conftest import FakeClock
+from app.clock import VirtualClock
 
 
-def test_fake_clock_wait_ends_if_its_time_passed_before_the_wait_started(clock: FakeClock) -> None:
+def test_fake_clock_wait_ends_if_its_time_passed_before_the_wait_started(clock: VirtualClock) -> None:
     due = clock.now() + 0.5
     rest = due - clock.now()
     clock.advance(0.6)  # due time passes before the wait

@@ -198,6 +198,7 @@ def test_killed_command_thread_stops_the_robot_and_restarts(turtle, caplog):
     eventually(lambda: body.moving)
     for count in range(1, 4):
         kill("Turtle commands")
+        ears.command(id="wake", op="alive")  # the exception is raised when the thread's wait ends
         eventually(lambda count=count: body.stops >= count)
         assert ears.final("1")["error"] == "its driver had an internal error"
         assert stops(ears, f"s{count}")

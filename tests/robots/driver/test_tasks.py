@@ -8,10 +8,11 @@ from typing import Any
 
 import pytest
 
+from app.clock import VirtualClock
 from app.robots.driver.call import Canceled
 from app.robots.driver.task import Task, TaskReply
 from app.robots.driver.tasks import Tasks
-from tests.robots.conftest import FakeClock, eventually
+from tests.robots.conftest import eventually
 
 
 class World:
@@ -21,7 +22,9 @@ class World:
         self.began: list[str] = []
         self.answers: dict[str, list[TaskReply]] = {}
         self.let_go: dict[str, threading.Event] = {}
-        self.tasks = Tasks("Bot", lambda: None, FakeClock(), within_s=0.1, watchdog_s=None)
+        self.tasks = Tasks(
+            "Bot", lambda: None, VirtualClock(advances_alone=False), within_s=0.1, watchdog_s=None
+        )
         self.tasks.start()
 
     def ask(self, name: str, uses: tuple[str, ...], *, obeys: bool = True, **more: Any) -> None:

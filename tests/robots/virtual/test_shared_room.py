@@ -9,6 +9,7 @@ from dataclasses import replace
 import pytest
 
 import nep
+from app.clock import VirtualClock
 from app.robots.driver.driver import Driver
 from app.robots.simulated import ROBOT as PEPPER
 from app.robots.turtle import ROBOT as TURTLE
@@ -18,7 +19,7 @@ from app.robots.virtual.neighbours import PRESENCE_TIMEOUT_S, Neighbours
 from app.robots.virtual.room import OtherRobot, Room
 from app.robots.virtual.room_map import TOPIC, RoomMap
 from app.robots.virtual.wheels import WheelBody
-from tests.robots.conftest import Ears, FakeClock, eventually
+from tests.robots.conftest import Ears, eventually
 
 OTHER = OtherRobot("Turtle", 0.6, 0.0, 180.0, 0.17, 0.34, "turtle")
 
@@ -112,7 +113,7 @@ def test_carried_robot_does_not_overlap_walls_or_furniture(body) -> None:
 
 
 def test_robot_that_stops_publishing_is_removed_from_the_neighbours() -> None:
-    time = FakeClock()
+    time = VirtualClock(advances_alone=False)
     seen = Neighbours("Pepper", time, began_ns=5)
     told: list[dict[str, object]] = []
     Neighbours("Turtle", time, began_ns=1).publish_position(OTHER, lambda message: told.append(dict(message)))
@@ -126,7 +127,7 @@ def test_robot_that_stops_publishing_is_removed_from_the_neighbours() -> None:
 
 
 def test_robot_started_later_gives_way_to_an_overlapping_robot() -> None:
-    time = FakeClock()
+    time = VirtualClock(advances_alone=False)
     first, second = Neighbours("A", time, began_ns=1), Neighbours("B", time, began_ns=2)
     first.publish_position(OtherRobot("A", 0, 0, 0, 0.27, 1.2), second.receive)
     second.publish_position(OtherRobot("B", 0, 0.1, 0, 0.27, 1.2), first.receive)

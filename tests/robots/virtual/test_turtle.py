@@ -12,6 +12,7 @@ import pytest
 
 import nep
 from app import resources
+from app.clock import VirtualClock
 from app.robots.diffdrive import DIFFDRIVE
 from app.robots.driver.driver import Driver
 from app.robots.turtle import ROBOT
@@ -20,7 +21,7 @@ from app.robots.virtual.lens import Lens
 from app.robots.virtual.room import Room
 from app.robots.virtual.vision import colours_in
 from app.robots.virtual.wheels import BRAKING, PRESS_DURATION_S, RADIUS, START_POSE, WheelBody
-from tests.robots.conftest import Ears, FakeClock, eventually
+from tests.robots.conftest import Ears, eventually
 
 WATCHDOG_S = 0.5
 
@@ -148,7 +149,7 @@ def turtle(node: nep.Node):
 
 
 @pytest.fixture
-def watched_turtle(node: nep.Node, clock: FakeClock):
+def watched_turtle(node: nep.Node, clock: VirtualClock):
     """Turtle whose watchdog has the clock of the test, its listener, and the clock."""
     with nep.node("listener", "memory") as other, Driver(ROBOT, "Turtle", node, clock=clock) as driver:
         assert driver.robot.safe_stop.watchdog_s == WATCHDOG_S
@@ -207,9 +208,10 @@ def test_missing_heartbeat_of_the_program_stops_a_driving_robot(watched_turtle) 
     body, ears, clock = watched_turtle
     ears.invoke("1", "drive", program="test", speed=-0.2, turn=30)
     assert ears.final("1")["state"] == "succeeded"
-    eventually(lambda: not body.wheels.is_still())
+    clock.advance(0.1)
+    assert not body.wheels.is_still()
     clock.advance(WATCHDOG_S + 0.1)
-    eventually(body.wheels.is_still)  # no heartbeat was sent
+    eventually(lambda: body.wheels.is_still() or clock.advance(0.005))  # no heartbeat was sent
     assert ears.heard["state"][-1]["figure"] == "turtle"
 
 
@@ -217,7 +219,7 @@ def test_robot_keeps_driving_while_its_program_sends_heartbeats_until_stopped(wa
     body, ears, clock = watched_turtle
     ears.invoke("1", "drive", program="test", speed=0.0, turn=60)
     ears.final("1")
-    eventually(lambda: not body.wheels.is_still())
+    clock.advance(0.1)
     for number in range(5):
         clock.advance(0.6 * WATCHDOG_S)
         ears.command(op="alive", id="a", **{"from": "test"})
@@ -225,6 +227,7 @@ def test_robot_keeps_driving_while_its_program_sends_heartbeats_until_stopped(wa
         ears.final(f"l{number}")  # the heartbeat was processed before
     assert not body.wheels.is_still()
     ears.command(id="s", op="stop")
+    eventually(lambda: ears.states("s") or clock.advance(0.005))
     assert ears.final("s", "stop")["state"] == "succeeded"
     assert body.wheels.is_still()
 

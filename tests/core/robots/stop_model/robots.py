@@ -7,6 +7,7 @@ from typing import Annotated, Any, cast
 
 import orjson
 
+from app.clock import MonotonicClock
 from app.robots.identity import DESCRIPTION_TYPE
 from app.robots.kit import Call, Driver, Failed, Kind, Link, Range, action, safe_stop
 from tests.core.robots.stop_model.clock import SimulatedClock
@@ -58,7 +59,7 @@ class Rover:
 ROVER = Kind(model="rover", title="Rover", body=Rover)
 
 
-class RobotClock:
+class RobotClock(MonotonicClock):
     """Clock of one robot's process; its waits don't end while the process is frozen or dead."""
 
     def __init__(self, clock: SimulatedClock, node: SimulatedNode) -> None:
@@ -69,9 +70,6 @@ class RobotClock:
 
     def wait(self, event: Any, timeout_s: float | None) -> bool:
         return self._clock.wait(event, timeout_s, lambda: not self._node.is_running)
-
-    def wait_for(self, *given: Any) -> bool:
-        raise NotImplementedError(given)
 
 
 class SimulatedRobot:
@@ -84,9 +82,7 @@ class SimulatedRobot:
         clock.follow(f"{name} ")
         self.node = network.node(f"{name} driver")
         self.node.is_connecting = connects_late
-        self.driver = Driver(
-            ROVER, name, cast("Any", self.node), clock=cast("Any", RobotClock(clock, self.node))
-        )
+        self.driver = Driver(ROVER, name, cast("Any", self.node), clock=RobotClock(clock, self.node))
         self.driver.start()
 
     @property
