@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import pytest
 
 import nep
-from app.core.run.acting import sending
+from app.clock import VirtualClock
 from app.core.run.acting.arming import Arming, Target
-from app.core.run.acting.sending import MAX_AGE_S, MAX_REPEATED_MESSAGES, Outbox, RepeatedMessage, SendOrder
+from app.core.run.acting.sending import MAX_AGE_S, MAX_REPEATED_MESSAGES, Outbox, SendOrder
 from nep.errors import NepError
 from nep.nodes.node import Node
 from tests.nep.programs import eventually
@@ -19,16 +19,22 @@ class Bench:
     """Outbox whose jobs run on a node in memory, immediately or when the test runs them."""
 
     def __init__(self, node: Node) -> None:
-        self.node, self.now = node, 0.0
+        self.node, self.clock = node, VirtualClock(advances_alone=False)
         self.waiting: list[object] | None = None
-        self.arming = Arming(lambda: self.now)
-        self.outbox = Outbox(self.arming, self._submit, lambda: self.now)
+        self.arming = Arming(self.clock.now)
+        self.outbox = Outbox(self.arming, self._submit, clock=self.clock)
 
     def _submit(self, _what: str, job) -> None:
         if self.waiting is None:
             job(self.node)
         else:
             self.waiting.append(job)
+
+    def advance(self, seconds: float) -> None:
+        """Advance the clock once the repeated messages that are due have been sent."""
+        now = self.clock.now()
+        eventually(lambda: all(each.due_s > now for each in self.outbox.repeated_messages))
+        self.clock.advance(seconds)
 
     def arm(self, *topics: str) -> None:
         self.arming.arm()
@@ -84,7 +90,7 @@ def test_message_delayed_by_missing_master_is_not_sent_when_expired_or_disarmed(
     bench.arming.disarm()
     bench.arm("/cmd_vel")
     first(bench.node)
-    bench.now += MAX_AGE_S + 1
+    bench.clock.advance(MAX_AGE_S + 1)
     second(bench.node)
     said = [each.message for each in bench.outbox.pop_results()]
     assert said == ["not sent: no longer armed", "not sent: no master was running"]
@@ -110,6 +116,7 @@ def test_message_repeats_until_stopped(bench) -> None:
     assert bench.outbox.start(order(), 50)
     for _each in range(3):
         assert heard.listen(timeout_s=20.0) == (True, {"x": 1})
+        bench.advance(0.02)
     bench.outbox.stop("a")
     assert not bench.outbox.is_sending("a")
     began, ended = bench.outbox.pop_results()
@@ -125,6 +132,7 @@ def test_disarming_ends_repetition_without_polling(bench) -> None:
     bench.arm("/cmd_vel")
     bench.outbox.start(order(), 50)
     bench.arming.disarm()
+    bench.advance(0.02)
     eventually(lambda: not bench.outbox.is_sending("a"))
     assert kinds(bench) == ["began", "ended"]
 
@@ -142,10 +150,11 @@ def test_repeated_message_that_raises_ends_and_other_messages_continue(bench) ->
 
     bench.outbox.start(SendOrder("b", "Bad", "/bad", "json", once), 50)
     bench.outbox.start(order("/good", id="g"), 50)
+    bench.advance(0.02)
     eventually(lambda: not bench.outbox.is_sending("b"))
-    while heard.receive(0.0) is not None:
-        pass
-    assert heard.listen(timeout_s=20.0)[0]
+    bench.advance(0.02)
+    for _each in range(3):
+        assert heard.listen(timeout_s=20.0)[0]
     failed = next(each for each in bench.outbox.pop_results() if each.kind == "failed")
     assert (failed.message, failed.count) == ("Fill in “yaw” first.", 1)
 
@@ -158,13 +167,17 @@ def test_number_and_rate_of_repeated_messages_are_limited(bench) -> None:
     assert {each.rate_hz for each in bench.outbox.repeated_messages} == {0.1}
 
 
-def test_late_repetition_skips_missed_sends_without_a_burst(bench, monkeypatch) -> None:
-    now = [100.0]
-    monkeypatch.setattr(sending.time, "monotonic", lambda: now[0])
-    each = RepeatedMessage(order(), 10.0, 1, None, None, 100.0, since_s=100.0)  # type: ignore[arg-type]
-    assert (Outbox._schedule_next(each), round(each.due_s, 6)) == (0, 100.1)
-    now[0] = 100.55  # 100.1 is due; 100.2 to 100.5 were missed
-    assert Outbox._schedule_next(each) == 4
-    assert round(each.due_s, 6) == 100.6
-    now[0] = 100.6
-    assert (Outbox._schedule_next(each), round(each.due_s, 6)) == (0, 100.7)
+def test_late_repetition_skips_missed_sends_without_a_burst(bench) -> None:
+    heard = bench.node.new_sub("/cmd_vel", "json")
+    bench.arm("/cmd_vel")
+    bench.outbox.start(order(), 10)
+    counts = []
+    for passed_s in (0.0, 0.1, 0.45, 0.06):  # 0.2 s is late; 0.3 to 0.5 s are missed
+        bench.advance(passed_s)
+        assert heard.listen(timeout_s=20.0) == (True, {"x": 1})
+        bench.advance(0.0)
+        repeated = bench.outbox.repeated("a")
+        counts.append((repeated.count, repeated.dropped_count))
+    assert counts == [(1, 0), (2, 0), (3, 3), (4, 3)]
+    bench.advance(0.08)
+    assert heard.receive(0.1) is None

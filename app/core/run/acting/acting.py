@@ -108,7 +108,7 @@ class SessionActing(SessionPart):
         self.on_moved: OnMoved = ignore_moved
         """Called with the robots that a message moves, and the kind of sender: "shelf", "image" or "replay".
         """
-        self.outbox = Outbox(self.arming, self.submit, clock, self.gate)
+        self.outbox = Outbox(self.arming, self.submit, self.gate)
         self.calls = ServiceCalls(self.arming, self.submit, clock, clock_s)
         self.recorded_commands: frozenset[str] = frozenset()
         """Command topics of the robots in a recording; cleared when switched off."""

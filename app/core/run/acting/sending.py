@@ -6,11 +6,11 @@ Publishers are opened in the network thread; one thread sends all repeated messa
 from __future__ import annotations
 
 import threading
-import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from app.clock import Clock, MonotonicClock, ThreadClock
 from app.core.faults import error_text
 from app.core.network.source import Job
 from app.core.robots.motion.gate import MotionGate
@@ -89,6 +89,7 @@ class RepeatedMessage:
     turn: int
     node: Node
     publisher: Publisher
+    clock: Clock
     due_s: float
     count: int = 0
     dropped_count: int = 0
@@ -99,7 +100,7 @@ class RepeatedMessage:
     @property
     def measured_hz(self) -> float:
         """Measured rate in messages per second; 0 before the second message."""
-        elapsed_s = time.monotonic() - self.since_s
+        elapsed_s = self.clock.now() - self.since_s
         return (self.count - 1) / elapsed_s if self.count > 1 and elapsed_s > 0 else 0.0
 
 
@@ -113,14 +114,17 @@ class Outbox:
         self,
         arming: Arming,
         submit: Callable[[str, Job], None],
-        clock: Callable[[], float] = time.monotonic,
         gate: MotionGate | None = None,
+        clock: ThreadClock | None = None,
     ) -> None:
         # `gate` knows which messages would move a robot without permission; without it all are sent.
+        # `clock` is replaceable in tests.
         self._gate = gate
         self._last_subscriber_counts: dict[Publisher, int] = {}
-        self._arming, self._submit, self._clock = arming, submit, clock
-        self._changed = threading.Condition()
+        self._arming, self._submit = arming, submit
+        self._clock: ThreadClock = clock or MonotonicClock()
+        self._lock = threading.RLock()
+        self._wake = self._clock.event()
         self._publishers: dict[tuple[str, str], Publisher] = {}
         self._repeated_messages: dict[str, RepeatedMessage] = {}
         self._starting_tokens: dict[str, object] = {}
@@ -137,25 +141,25 @@ class Outbox:
 
     def repeated(self, order_id: str) -> RepeatedMessage | None:
         """Return the state of a message that is sent repeatedly; None if the message isn't being sent."""
-        with self._changed:
+        with self._lock:
             return self._repeated_messages.get(order_id)
 
     @property
     def repeated_messages(self) -> tuple[RepeatedMessage, ...]:
         """Messages that are being sent repeatedly."""
-        with self._changed:
+        with self._lock:
             return tuple(self._repeated_messages.values())
 
     def is_sending(self, order_id: str) -> bool:
         """Return True if a message is being sent repeatedly, or will be once its publisher is open."""
-        with self._changed:
+        with self._lock:
             return order_id in self._repeated_messages or order_id in self._starting_tokens
 
     # ---- requests
 
     def send(self, order: SendOrder) -> None:
         """Send a message once, in the background; `pop_results` returns the result or the error."""
-        turn, requested_s = self._arming.turn, self._clock()
+        turn, requested_s = self._arming.turn, self._clock.now()
 
         def send_job(node: Node) -> None:
             publisher = self._open_publisher(node, order)
@@ -181,8 +185,8 @@ class Outbox:
             rate_hz: Messages per second, limited to `MIN_HZ` to `MAX_HZ`.
         """
         rate_hz = min(MAX_HZ, max(MIN_HZ, rate_hz))
-        turn, requested_s, token = self._arming.turn, self._clock(), object()
-        with self._changed:
+        turn, requested_s, token = self._arming.turn, self._clock.now(), object()
+        with self._lock:
             if (
                 len(self._repeated_messages.keys() | self._starting_tokens.keys() | {order.id})
                 > MAX_REPEATED_MESSAGES
@@ -195,23 +199,22 @@ class Outbox:
                 order.create_payload()
             )  # errors are reported before anything is sent
             publisher = self._open_publisher(node, order)
-            now = time.monotonic()
-            repeated = RepeatedMessage(order, rate_hz, turn, node, publisher, now, since_s=now)
-            with self._changed:
+            now = self._clock.now()
+            repeated = RepeatedMessage(order, rate_hz, turn, node, publisher, self._clock, now, since_s=now)
+            with self._lock:
                 if self._starting_tokens.get(order.id) is not token:
                     return  # ended meanwhile
                 self._repeated_messages[order.id] = repeated
                 if self._thread is None and not self._is_closed:
-                    self._thread = threading.Thread(target=self._run, name="studio-sending", daemon=True)
-                    self._thread.start()
-                self._changed.notify_all()
+                    self._thread = self._clock.start_thread(self._run, "studio-sending")
+            self._wake.set()
             self._add_result(SendResult(order, "began"))
 
         def run_start_job(node: Node) -> None:
             try:
                 start_job(node)
             finally:
-                with self._changed:
+                with self._lock:
                     if self._starting_tokens.get(order.id) is token:
                         del self._starting_tokens[order.id]
 
@@ -220,16 +223,15 @@ class Outbox:
 
     def stop(self, order_id: str) -> None:
         """Stop sending a repeated message."""
-        with self._changed:
+        with self._lock:
             self._starting_tokens.pop(order_id, None)
             message = self._repeated_messages.pop(order_id, None)
-            self._changed.notify_all()
         if message is not None:
             self._report_end(message)
 
     def stop_all(self) -> None:
         """Stop all sending and close the publishers."""
-        with self._changed:
+        with self._lock:
             self._starting_tokens.clear()
             ids = list(self._repeated_messages)
         for message_id in ids:
@@ -240,9 +242,9 @@ class Outbox:
     def close(self) -> None:
         """Stop all sending and wait for the thread."""
         self.stop_all()
-        with self._changed:
+        with self._lock:
             self._is_closed = True
-            self._changed.notify_all()
+        self._wake.set()
         if self._thread is not None:
             self._thread.join(2.0)
 
@@ -251,7 +253,7 @@ class Outbox:
     def _guarded_job(self, order: SendOrder, requested_s: float, job: Job) -> Job:
         def run(node: Node) -> None:
             try:
-                if self._clock() - requested_s > MAX_AGE_S:
+                if self._clock.now() - requested_s > MAX_AGE_S:
                     raise NepError(_("not sent: no master was running"))
                 job(node)
             except NepError as error:
@@ -276,7 +278,7 @@ class Outbox:
 
     def _open_publisher(self, node: Node, order: SendOrder) -> Publisher:
         key = (order.topic, order.msg_type)
-        with self._changed:
+        with self._lock:
             used_keys = {(each.order.topic, each.order.msg_type) for each in self._repeated_messages.values()}
         publisher = self._publishers.get(key)
         if publisher is None or publisher.is_closed:
@@ -287,7 +289,7 @@ class Outbox:
         return publisher
 
     def _close_unused(self) -> None:
-        with self._changed:
+        with self._lock:
             used_keys = {(each.order.topic, each.order.msg_type) for each in self._repeated_messages.values()}
         if self._arming.is_on:
             return  # armed again meanwhile
@@ -321,19 +323,18 @@ class Outbox:
 
     def _run(self) -> None:
         while True:
-            with self._changed:
+            self._wake.clear()
+            with self._lock:
                 if self._is_closed:
                     return
-                now = time.monotonic()
-                due = [repeated for repeated in self._repeated_messages.values() if repeated.due_s <= now]
-                if not due:
-                    next_s = min(
-                        (repeated.due_s for repeated in self._repeated_messages.values()), default=None
-                    )
-                    self._changed.wait(None if next_s is None else max(0.0, next_s - now))
-                    continue
+                messages = list(self._repeated_messages.values())
+            now = self._clock.now()
+            due = [repeated for repeated in messages if repeated.due_s <= now]
             for repeated in due:
                 self._send_repeated(repeated)
+            if not due:
+                next_s = min((repeated.due_s for repeated in messages), default=None)
+                self._clock.wait(self._wake, None if next_s is None else max(0.0, next_s - now))
 
     def _send_repeated(self, repeated: RepeatedMessage) -> None:
         problem = ""
@@ -349,22 +350,21 @@ class Outbox:
             repeated.subscriber_count = repeated.publisher.subscribers
             repeated.dropped_count += self._schedule_next(repeated)
             return
-        with self._changed:
+        with self._lock:
             if self._repeated_messages.get(repeated.order.id) is repeated:
                 del self._repeated_messages[repeated.order.id]
         self._report_end(repeated, problem)
 
     def _publish(self, repeated: RepeatedMessage, payload: object) -> None:
-        with self._changed:  # an ended message is not sent once more
+        with self._lock:  # an ended message is not sent once more
             if self._repeated_messages.get(repeated.order.id) is repeated:
                 repeated.publisher.publish(payload)
                 repeated.count += 1
 
-    @staticmethod
-    def _schedule_next(repeated: RepeatedMessage) -> int:
+    def _schedule_next(self, repeated: RepeatedMessage) -> int:
         # Sets the next due time; returns the number of messages omitted because they are late.
         period_s = 1 / repeated.rate_hz
-        late_count = max(0, int((time.monotonic() - repeated.due_s) / period_s))
+        late_count = max(0, int((self._clock.now() - repeated.due_s) / period_s))
         repeated.due_s += (1 + late_count) * period_s
         return late_count
 
