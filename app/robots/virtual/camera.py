@@ -114,10 +114,10 @@ class Camera:
         if isinstance(figure, Person):
             picture, width = self._person, figure.height * scenery.FIGURE_ASPECT_RATIO
         else:
-            picture, width = (
-                self._robot(figure.figure == "turtle", is_front=_is_facing_camera(figure, canvas.lens)),
-                figure.radius * 2.6,
-            )
+            # Robots can report any text; the cache has one texture for all unknown ones.
+            name = figure.figure if figure.figure in scenery.ROBOT_FIGURES else scenery.NEUTRAL_FIGURE
+            picture = self._robot(name, is_front=_is_facing_camera(figure, canvas.lens))
+            width = figure.radius * 2.6
         corner = np.array([figure.x, figure.y, figure.height]) - right * width / 2
         canvas.draw_texture(picture, corner.tolist(), (right * width).tolist(), (0, 0, -figure.height))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import cv2
 import numpy as np
@@ -283,16 +283,25 @@ def _paint_head(painter: _Painter) -> None:
     painter.paint_arc((0.5, 0.154), (0.085, 0.024), "#a8493f", (18, 162))
 
 
-def robot(is_small: bool, *, is_front: bool) -> Texture:
+def robot(figure: str, *, is_front: bool) -> Texture:
     """Return the texture of another robot.
 
     Args:
-        is_small: True for the small green robot, False for the large white one.
+        figure: Key of `ROBOT_FIGURES`, or `NEUTRAL_FIGURE`.
         is_front: True for the view from the front, False from behind.
     """
-    painter = _Painter(*(FIGURE_SIZE_PX if not is_small else (400, 300)))
-    (_paint_small_robot if is_small else _paint_large_robot)(painter, is_front=is_front)
+    size_px, paint = ROBOT_FIGURES.get(figure, (FIGURE_SIZE_PX, _paint_neutral_robot))
+    painter = _Painter(*size_px)
+    paint(painter, is_front=is_front)
     return Texture(painter.render())
+
+
+def _paint_neutral_robot(painter: _Painter, *, is_front: bool) -> None:
+    painter.paint_polygon([(0.12, 0.05), (0.88, 0.05), (0.88, 0.95), (0.12, 0.95)], "#9aa3b2")
+    painter.paint_oval((0.5, 0.95), (0.38, 0.04), "#9aa3b2")
+    painter.paint_oval((0.5, 0.05), (0.38, 0.04), "#b9c0cc")
+    if is_front:
+        painter.paint_polygon([(0.3, 0.12), (0.7, 0.12), (0.7, 0.2), (0.3, 0.2)], "#3a4150")
 
 
 def _paint_large_robot(painter: _Painter, *, is_front: bool) -> None:
@@ -328,6 +337,15 @@ def _paint_small_robot(painter: _Painter, *, is_front: bool) -> None:
     painter.paint_polygon([(0.34, 0.06), (0.66, 0.06), (0.66, 0.28), (0.34, 0.28)], "#e9edf4")
     if is_front:
         painter.paint_oval((0.5, 0.17), (0.08, 0.09), "#1b1e2a")
+
+
+ROBOT_FIGURES: Mapping[str, tuple[tuple[int, int], Callable[..., None]]] = {
+    "pepper": (FIGURE_SIZE_PX, _paint_large_robot),
+    "turtle": ((400, 300), _paint_small_robot),
+}
+"""Size of the image in pixels and painter of each known figure of a robot."""
+NEUTRAL_FIGURE = ""
+"""Figure of all other robots: an upright cylinder, as which they block the room."""
 
 
 def ball(colour: str) -> Texture:

@@ -68,6 +68,18 @@ def test_camera_shows_the_other_robots() -> None:
     assert with_other(Room(), hidden).is_hidden((-0.5, 0.0, 1.1), (1.5, 0.0, 0.9))
 
 
+def test_camera_shows_a_robot_of_an_unknown_figure_in_its_size_but_not_as_pepper() -> None:
+    body = Body()
+    camera = Camera(body.room)
+    pepper = OtherRobot("Ada", 1.5, 0.0, 180.0, 0.27, 1.2, "pepper")
+    others = (pepper, replace(pepper, figure="forklift"), replace(pepper, figure="crane"))
+    of_pepper, of_forklift, of_crane = (
+        camera.picture(with_other(Room(), other), lens_of(body)).astype(int) for other in others
+    )
+    assert (abs(of_forklift - of_pepper).max(axis=2) > 30).mean() > 0.01
+    assert (of_forklift == of_crane).all()
+
+
 # ---- lifted by a person ---------------------------------------------------------------------------
 
 
