@@ -160,7 +160,7 @@ class Session:
     def _parts(self) -> Sequence[SessionPart]:
         # Parts are started and updated in this order, and closed in the reverse order: the program before
         # the robots that it uses, and the recorder before the network and the master that it may need.
-        live, fleet, launcher, documents = self.live, self.fleet, self.launcher, self.documents
+        live, fleet, launcher, projects = self.live, self.fleet, self.launcher, self.documents
         return (
             Resource(self.web_pages),
             Resource(self.remote_access),
@@ -177,10 +177,10 @@ class Session:
             ConnectedRobots(live, fleet, launcher, self.alerts),
             StopConnections(self, self._health),
             self.voices,
-            OpenBehaviourTabs(live, fleet, documents, self.tabs),
+            OpenBehaviourTabs(live, fleet, projects, self.tabs),
             self.alarms,
             self.acting,
-            SpareProgram(self._spare_child, documents, self._clock, is_enabled=self._start_processes),
+            SpareProgram(self._spare_child, projects, self._clock, is_enabled=self._start_processes),
             CurrentRun(self.runs, self.recordings.events.update_run),
             RepeatedStops(self.runs, fleet),
             HealthChecks(
@@ -188,7 +188,7 @@ class Session:
                 self._health,
                 runs=self.runs,
                 launcher=launcher,
-                documents=documents,
+                projects=projects,
                 settings=self.settings,
                 own_program=self._own_program,
             ),
@@ -248,12 +248,12 @@ class Session:
         connected = {link.name for link in self.fleet.connected}
         return tuple(name for name in self.launcher.starting_robots if name not in connected)
 
-    def confirm_discard(self, document: OpenProject) -> bool:
+    def confirm_discard(self, project: OpenProject) -> bool:
         """Return True if the user confirms discarding work that can't be saved.
 
         The first call raises an alert and returns False; a second call confirms.
         """
-        return self._health.confirm_discard(document.name, document.journal_error or "")
+        return self._health.confirm_discard(project.name, project.journal_error or "")
 
     def guarded(self, phrase: str, **placeholder_values: object) -> AbstractContextManager[None]:
         """Return a context manager that logs exceptions of one step, raises an alert and suppresses them.

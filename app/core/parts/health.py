@@ -51,12 +51,12 @@ class HealthChecks(SessionPart):
         *,
         runs: Runs,
         launcher: Launcher,
-        documents: OpenProjects,
+        projects: OpenProjects,
         settings: Settings,
         own_program: OwnProgram,
     ) -> None:
         self._live, self._health, self._runs, self._launcher = live, health, runs, launcher
-        self._documents, self._settings, self._own_program = documents, settings, own_program
+        self._projects, self._settings, self._own_program = projects, settings, own_program
 
     def tick(self) -> None:
         """Update the alerts about the graph and about messages that can't be decoded."""
@@ -67,7 +67,7 @@ class HealthChecks(SessionPart):
     def check(self) -> None:
         """Update all other alerts, and retry to save journals."""
         self._health.check(self._runs.used_robots, self._launcher.virtual_robots)
-        self._documents.retry_journals()
-        self._health.report_journal_problem(self._documents.journal_error)
+        self._projects.retry_journals()
+        self._health.report_journal_problem(self._projects.journal_error)
         self._health.report_settings_problem(self._settings.write_error)
         self._health.report_executable_state(self._own_program.executable_state())

@@ -31,19 +31,19 @@ class OpenBehaviourTabs(SessionPart):
 
     task = lazy("save the open tabs")
 
-    def __init__(self, live: LiveWorld, fleet: Fleet, documents: OpenProjects, tabs: SavedTabs) -> None:
-        self._live, self._fleet, self._documents, self._tabs = live, fleet, documents, tabs
+    def __init__(self, live: LiveWorld, fleet: Fleet, projects: OpenProjects, tabs: SavedTabs) -> None:
+        self._live, self._fleet, self._projects, self._tabs = live, fleet, projects, tabs
         self._fleet_revision = self._topics_revision = -1
 
     def tick(self) -> None:
         """Tell the behaviours about changed robots and topics."""
         if self._fleet.revision != self._fleet_revision:
             self._fleet_revision = self._fleet.revision
-            self._documents.set_connected([link.robot for link in self._fleet.connected])
+            self._projects.set_connected([link.robot for link in self._fleet.connected])
         topics = self._live.topics
         if topics.revision != self._topics_revision:
             self._topics_revision = topics.revision
-            self._documents.set_topics(sorted(topic.name for topic in topics.existing_topics()))
+            self._projects.set_topics(sorted(topic.name for topic in topics.existing_topics()))
 
     def check(self) -> None:
         """Save changed tabs."""
@@ -53,7 +53,7 @@ class OpenBehaviourTabs(SessionPart):
         """Save the tabs, and close the behaviours."""
         with log_errors("save the tabs"):
             self._tabs.save(has_ended_normally=True)
-        self._documents.close_all()
+        self._projects.close_all()
 
 
 class SpareProgram(SessionPart):

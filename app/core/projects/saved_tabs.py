@@ -15,10 +15,10 @@ class SavedTabs:
     """Storage of the open tabs in the settings, restored at the next start."""
 
     def __init__(
-        self, settings: Settings, documents: OpenProjects, report_error: Callable[[str], object]
+        self, settings: Settings, projects: OpenProjects, report_error: Callable[[str], object]
     ) -> None:
         # `report_error` is called with a message if the tabs can't be saved.
-        self._settings, self._documents, self._report_error = settings, documents, report_error
+        self._settings, self._projects, self._report_error = settings, projects, report_error
         self.is_active = False
         """True if the tabs of this window are saved; False in a second window."""
         self._last_session: Mapping[str, object] = {}
@@ -35,7 +35,7 @@ class SavedTabs:
         """
         self.is_active = True
         tabs_state = self._last_session = self._settings.tabs
-        restored = self._documents.restore_tabs(
+        restored = self._projects.restore_tabs(
             tabs_state, unsaved_work, has_ended_normally=tabs_state.get("ended_well") is True
         )
         self.save()
@@ -44,18 +44,18 @@ class SavedTabs:
     def recover(self, unsaved_work: Sequence[UnsavedWork]) -> None:
         """Restore unsaved work into its tabs, and show the tab that was current."""
         newest_last = sorted(unsaved_work, key=lambda each: each.edited_s)
-        recovered = {each.journal.name: self._documents.recover(each) for each in newest_last}
-        self._documents.arrange_tabs(self._last_session, recovered)
+        recovered = {each.journal.name: self._projects.recover(each) for each in newest_last}
+        self._projects.arrange_tabs(self._last_session, recovered)
         self.save()
 
-    def on_edited(self, document: OpenProject, *, was_blank: bool) -> None:
+    def on_edited(self, project: OpenProject, *, was_blank: bool) -> None:
         """Save the tabs after the first edit of an empty behaviour.
 
         Args:
-            document: Behaviour that was edited.
+            project: Behaviour that was edited.
             was_blank: True if the behaviour was new and empty before the edit.
         """
-        if was_blank and not document.is_blank:
+        if was_blank and not project.is_blank:
             self.save()
 
     def save_if_changed(self) -> None:
@@ -63,7 +63,7 @@ class SavedTabs:
 
         Called once a second, so that switching tabs does not wait for the disk.
         """
-        if self._documents.revision != self._saved_revision:
+        if self._projects.revision != self._saved_revision:
             self.save()
 
     def save(self, *, has_ended_normally: bool = False) -> None:
@@ -74,8 +74,8 @@ class SavedTabs:
         """
         if not self.is_active:
             return
-        self._saved_revision = self._documents.revision
+        self._saved_revision = self._projects.revision
         try:
-            self._settings.tabs = {**self._documents.tabs_state(), "ended_well": has_ended_normally}
+            self._settings.tabs = {**self._projects.tabs_state(), "ended_well": has_ended_normally}
         except SettingsError as error:
             self._report_error(str(error))

@@ -81,7 +81,7 @@ class Runs:
 
     def __init__(
         self,
-        documents: OpenBehaviours,
+        projects: OpenBehaviours,
         fleet: Fleet,
         network: RunNetwork,
         *,
@@ -91,7 +91,7 @@ class Runs:
         clock: Callable[[], float] = time.monotonic,
         create_runner: Callable[[Callable[[RunnerEvent], object]], Runner] = Runner,
     ) -> None:
-        self._documents, self._fleet, self._network = documents, fleet, network
+        self._projects, self._fleet, self._network = projects, fleet, network
         self._alerts, self._console, self._post_event, self._clock = alerts, console, post_event, clock
         self._create_runner = create_runner
         self.starting_robots: Callable[[], Sequence[str]] = tuple  # names of robots that are starting
@@ -184,7 +184,7 @@ class Runs:
         self._view = None
         if (
             self._run.unrunnable_program is not None
-            and self._run.unrunnable_program is not self._documents.current.newest_program()
+            and self._run.unrunnable_program is not self._projects.current.newest_program()
         ):
             self._run = replace(self._run, unrunnable_program=None)  # another tab, or an edit
         self._settle()
@@ -207,7 +207,7 @@ class Runs:
 
     def view(self) -> RunView:
         """Return the contents of the run bar, cached until the next tick or change."""
-        run, current = self._run, self._documents.current
+        run, current = self._run, self._projects.current
         if self._view is None or self._view[0] is not run or self._view[1] is not current:
             names = [link.name for link in self._fleet.connected]
             is_elsewhere = self.document not in {None, current}
@@ -232,7 +232,7 @@ class Runs:
         if run.state == "paused":
             self.resume()
         elif run.state != "running" or self._clock() - run.started_s >= DOUBLE_CLICK_INTERVAL_S:
-            self._request_run(RequestedRun(self._documents.current))
+            self._request_run(RequestedRun(self._projects.current))
 
     def restart(self) -> None:
         """Restart the running or paused behaviour with its current blocks."""
@@ -244,25 +244,25 @@ class Runs:
 
         A stack that is only a variable isn't run: its value in the current or last run is shown.
         """
-        variable = stack.variable_id(self._documents.current.workspace)
+        variable = stack.variable_id(self._projects.current.workspace)
         if variable is not None:
             self._show_variable(stack, variable)
             return
-        request, run = RequestedRun(self._documents.current, stack=stack), self._run
+        request, run = RequestedRun(self._projects.current, stack=stack), self._run
         is_repeated = self.active and self._current_request == request
         if not is_repeated or self._clock() - run.started_s >= DOUBLE_CLICK_INTERVAL_S:
             self._request_run(request)
 
     def _show_variable(self, stack: Stack, id: str) -> None:
         # A new program would lack the value of the current or last run.
-        document = self._documents.current
-        value = self.values.get(id) if self.document is document else None
-        self._trial.set_value(document, stack, value.text if value is not None else _("no value yet"))
+        project = self._projects.current
+        value = self.values.get(id) if self.document is project else None
+        self._trial.set_value(project, stack, value.text if value is not None else _("no value yet"))
 
-    def is_running_or_pending(self, document: OpenProject) -> bool:
+    def is_running_or_pending(self, project: OpenProject) -> bool:
         """Return True if this behaviour is running, or will be run when another program has stopped."""
-        return (self.active and self.document is document) or (
-            self._pending_request is not None and self._pending_request.document is document
+        return (self.active and self.document is project) or (
+            self._pending_request is not None and self._pending_request.document is project
         )
 
     def _request_run(self, request: RequestedRun) -> None:
@@ -282,7 +282,7 @@ class Runs:
         A running program is paused.
         """
         if self._run.state in {"ready", "proven"}:
-            self._start(RequestedRun(self._documents.current, starts_paused=True))
+            self._start(RequestedRun(self._projects.current, starts_paused=True))
         elif self._run.state == "running":
             self.pause()
         elif self._run.state == "paused" and self._runner is not None:
@@ -498,8 +498,8 @@ class Runs:
     # -- private -----------------------------------------------------------------------------------------
 
     def _start(self, request: RequestedRun) -> None:
-        document, self._current_request = request.document, request
-        is_same, self.document = self.document is document, document
+        project, self._current_request = request.document, request
+        is_same, self.document = self.document is project, project
         self._trial.prepare(request)
         self._alerts.resolve("program")
         self._warnings.reset()
@@ -523,7 +523,7 @@ class Runs:
                 program,
                 [link.robot.source for link in self._fleet.connected],
                 self._network.address,
-                name=document.name,
+                name=project.name,
                 paused=request.starts_paused,
                 pace_s=self.pace_s,
                 owners=owners,
@@ -540,8 +540,8 @@ class Runs:
         if request.stack is None or not is_same:
             self._show_values({})  # trying a block keeps the values of other variables
         self._console.ignore_process(runner.pid)
-        self._edits.set_program(document if request.stack is None else None, program)
-        self._show_start(self._documents.title(document), self._trial.start(program, robots))
+        self._edits.set_program(project if request.stack is None else None, program)
+        self._show_start(self._projects.title(project), self._trial.start(program, robots))
 
     def _show_start(self, title: str, tried_label: str) -> None:
         run, previous = RunState("running", title, is_started=False, tried_label=tried_label), self._run

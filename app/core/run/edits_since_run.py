@@ -24,32 +24,32 @@ class EditsSinceRun:
     """
 
     def __init__(self) -> None:
-        self._document: RunDocument | None = None
+        self._project: RunDocument | None = None
         self._edit_count = 0
         self._started_code = ""
         self._compared_program: Program | None = None
         self._is_edited = False
 
-    def set_program(self, document: RunDocument | None, program: Program) -> None:
+    def set_program(self, project: RunDocument | None, program: Program) -> None:
         """Set the running program.
 
         Args:
-            document: Behaviour of the program; None to ignore edits.
+            project: Behaviour of the program; None to ignore edits.
             program: Program that was started.
         """
-        self._document, self._started_code = document, program.runnable
-        self._edit_count = 0 if document is None else document.edits
+        self._project, self._started_code = project, program.runnable
+        self._edit_count = 0 if project is None else project.edits
         self._compared_program, self._is_edited = program, False
 
     def has_edits(self) -> bool:
         """Return True if the current blocks differ from the running program."""
-        if self._document is None:
+        if self._project is None:
             return False
-        newest = self._document.newest_program()
+        newest = self._project.newest_program()
         if newest is None or newest is self._compared_program:
             return self._is_edited
         self._compared_program = newest
-        if self._document.edits == self._edit_count:
+        if self._project.edits == self._edit_count:
             self._started_code = (
                 newest.runnable
             )  # robots connected or disconnected: Restart would not apply an edit

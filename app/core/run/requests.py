@@ -22,7 +22,7 @@ class OpenBehaviours(Protocol):
     def current(self) -> OpenProject:
         """Behaviour of the current tab, to which Run applies."""
 
-    def title(self, document: OpenProject) -> str:
+    def title(self, project: OpenProject) -> str:
         """Return the title of a behaviour."""
 
 

@@ -65,12 +65,12 @@ class Trial:
         self.set_value(request.document, request.stack, text)
         return text
 
-    def set_value(self, document: OpenProject, stack: Stack, text: str) -> None:
+    def set_value(self, project: OpenProject, stack: Stack, text: str) -> None:
         """Set the value of a tried block.
 
         Args:
-            document: Behaviour of the block.
+            project: Behaviour of the block.
             stack: Stack that was tried.
             text: Formatted value.
         """
-        self.value = TriedValue(document, stack.id, text, next(self._numbers))
+        self.value = TriedValue(project, stack.id, text, next(self._numbers))

@@ -340,7 +340,7 @@ class MainWindow(QMainWindow):
         return next((dock for dock in docks if dock is not None), None)
 
     def flush(self, callback: Callable[[], None]) -> None:
-        """Apply the pending edit of the block editor to its document, then call `callback`."""
+        """Apply the pending edit of the block editor to its project, then call `callback`."""
         dock = self.find_dock("behaviour")
         if dock is None:
             callback()
@@ -506,7 +506,7 @@ class MainWindow(QMainWindow):
 
     def _update_status_bar(self) -> None:
         # Called less often than the tick, because numbers can't be read at 30 Hz.
-        formatter, document = self._status_formatter, self.session.document
+        formatter, project = self._status_formatter, self.session.document
         alerts = formatter.alerts(for_developers=self.current_layout == "developer")
         web = formatter.web_pages()
         self.status.commands = {
@@ -553,7 +553,7 @@ class MainWindow(QMainWindow):
         title = (
             "NEP Studio"
             if self.current_layout == START_PAGE
-            else f"{self.session.documents.title(document)} - NEP Studio"
+            else f"{self.session.documents.title(project)} - NEP Studio"
         )
         if title != self.windowTitle():
             self.setWindowTitle(title)
@@ -633,11 +633,11 @@ class MainWindow(QMainWindow):
 
     def _may_discard_work(self) -> bool:
         # True if no unsaved work would be lost, or the user has confirmed the loss.
-        documents = self.session.documents.retry_journals()
-        if not documents or self.session.confirm_discard(documents[0]):
+        projects = self.session.documents.retry_journals()
+        if not projects or self.session.confirm_discard(projects[0]):
             return True
         self.show_layout("behaviour")
-        self.session.documents.show(documents[0])
+        self.session.documents.show(projects[0])
         self.toast.show_toast(
             _(
                 "Can't close Studio: this behaviour can't be backed up. Save it, or close again to discard "

@@ -34,7 +34,7 @@ class ProjectController:
         dialogs: File dialogs.
         show_toast: Shows a toast.
         show_editor: Called when a behaviour was opened or reopened.
-        flush: Applies the pending edit of the block editor to its document, then calls a function.
+        flush: Applies the pending edit of the block editor to its project, then calls a function.
         show_current: Shows the current behaviour without waiting for the next tick.
     """
 
@@ -53,7 +53,7 @@ class ProjectController:
             show_toast,
             show_editor,
         )
-        self._documents = session.documents
+        self._projects = session.documents
         self._flush, self._show_current = flush, show_current
         self.open_recording: Callable[[Path], object] = lambda _path: None
         """Opens a recording that was dropped on the window or passed at startup."""
@@ -62,7 +62,7 @@ class ProjectController:
 
     def new(self) -> None:
         """Create an empty behaviour in a new tab."""
-        self._flush(lambda: self._open_tab(self._documents.new))
+        self._flush(lambda: self._open_tab(self._projects.new))
 
     def ask_open(self) -> None:
         """Ask for a behaviour file and open it."""
@@ -95,7 +95,7 @@ class ProjectController:
 
     def open_example(self, path: Path) -> None:
         """Open a copy of an example in a new tab."""
-        self._flush(lambda: self._open_tab(lambda: self._documents.open_example(path)))
+        self._flush(lambda: self._open_tab(lambda: self._projects.open_example(path)))
 
     def copy(self, path: Path, name: str) -> None:
         """Open a copy of a saved version in a new tab, without writing a file.
@@ -106,7 +106,7 @@ class ProjectController:
         """
 
         def open_copy() -> None:
-            self._documents.copy(path, name)
+            self._projects.copy(path, name)
             self._show_toast(_("Opened {name} as a copy").format(name=name))
 
         self._flush(lambda: self._open_tab(open_copy))
@@ -115,67 +115,67 @@ class ProjectController:
         """Open behaviours with unsaved changes in tabs, and show the most recently used one."""
         self._flush(lambda: self._open_tab(lambda: self._session.tabs.recover(unsaved)))
 
-    def close(self, *documents: OpenProject) -> None:
-        """Close the tabs of documents, stopping their programs.
+    def close(self, *projects: OpenProject) -> None:
+        """Close the tabs of projects, stopping their programs.
 
-        Unsaved changes are saved to the document's file or, if it has none, to a new file in the list
+        Unsaved changes are saved to the project's file or, if it has none, to a new file in the list
         of recent files. The toast offers to restore overwritten files. If saving fails, the tab stays
         open and an alert is shown.
         """
 
-        def close_documents() -> None:
+        def close_projects() -> None:
             runs = self._session.runs
             closed_projects = []
-            for document in documents:
-                if runs.is_running_or_pending(document):
+            for project in projects:
+                if runs.is_running_or_pending(project):
                     runs.stop()
                 try:
-                    closed_projects.append(self._session.files.close(document))
+                    closed_projects.append(self._session.files.close(project))
                 except AppError as error:
-                    self._documents.show(document)
+                    self._projects.show(project)
                     self._report_save_error(error)
             self._notify_closed([each for each in closed_projects if each.is_saved])
 
-        self._flush(close_documents)
+        self._flush(close_projects)
 
     def reopen(self) -> None:
         """Reopen the most recently closed tab."""
 
-        def reopen_document() -> None:
-            if self._documents.reopen() is None:
+        def reopen_project() -> None:
+            if self._projects.reopen() is None:
                 self._show_toast(_("No closed tabs"))
 
-        self._flush(lambda: self._open_tab(reopen_document))
+        self._flush(lambda: self._open_tab(reopen_project))
 
-    def show(self, document: OpenProject) -> None:
-        """Show the tab of a document, without waiting for the next tick."""
-        self._documents.show(document)
+    def show(self, project: OpenProject) -> None:
+        """Show the tab of a project, without waiting for the next tick."""
+        self._projects.show(project)
         self._show_current()
 
-    def duplicate(self, document: OpenProject) -> None:
-        """Open a copy of a document in a new tab."""
-        self._flush(lambda: self._open_tab(lambda: self._documents.duplicate(document)))
+    def duplicate(self, project: OpenProject) -> None:
+        """Open a copy of a project in a new tab."""
+        self._flush(lambda: self._open_tab(lambda: self._projects.duplicate(project)))
 
-    def rename(self, document: OpenProject, name: str) -> bool:
+    def rename(self, project: OpenProject, name: str) -> bool:
         """Rename a behaviour and its file; return False on failure, which is shown as an alert.
 
         The toast has an Undo button.
         """
-        old_name = document.name
+        old_name = project.name
         if name.strip() == old_name:
             return True
         try:
-            self._session.files.rename(document, name)
+            self._session.files.rename(project, name)
         except AppError as error:
             self._raise_alert(alert_text(error), SaveBehaviourAs(), _("Save somewhere else"))
             return False
-        message = _("Renamed {name} to {other}").format(name=old_name, other=document.name)
-        self._show_toast(message, _("Undo"), lambda: self.rename(document, old_name))
+        message = _("Renamed {name} to {other}").format(name=old_name, other=project.name)
+        self._show_toast(message, _("Undo"), lambda: self.rename(project, old_name))
         return True
 
-    def move(self, document: OpenProject, position: int) -> None:
-        """Move the tab of a document to a position, counted from 0."""
-        self._documents.move(document, position)
+    def move(self, project: OpenProject, position: int) -> None:
+        """Move the tab of a project to a position, counted from 0."""
+        self._projects.move(project, position)
         self._session.tabs.save()
 
     def save(self) -> None:
@@ -187,39 +187,39 @@ class ProjectController:
 
     def save_as(self) -> None:
         """Ask for a file and save the current behaviour to it."""
-        document = self._session.document
-        current_path = document.path
+        project = self._session.document
+        current_path = project.path
         folder = (
             current_path.parent
             if current_path is not None and current_path.parent != closed_tabs_folder()
             else Path.home()
         )
-        suggestion = str(folder / f"{document.name}{SUFFIX}")
+        suggestion = str(folder / f"{project.name}{SUFFIX}")
         self.dialogs.save(suggestion, lambda path: self._flush(lambda: self._save(path)))
 
     def fix(self, action: BlockFix) -> bool:
         """Apply a fix to the blocks of the current behaviour; return False if that isn't possible."""
-        document = self._session.document
-        if not document.can_fix(action):
+        project = self._session.document
+        if not project.can_fix(action):
             return False
 
         def apply_fix() -> None:
-            document.fix(action)
+            project.fix(action)
 
         self._flush(apply_fix)
         return True
 
     def _save(self, path: Path | None) -> None:
-        document = self._session.document
+        project = self._session.document
         try:
-            result = self._session.files.save(document, path)
+            result = self._session.files.save(project, path)
         except AppError as error:
             self._report_save_error(error)
             return
         self._session.alerts.resolve("file")
         earlier = result.version
         if earlier is None or result.reason == "edited":
-            self._show_toast(_("Saved {name}").format(name=document.name))
+            self._show_toast(_("Saved {name}").format(name=project.name))
             return
         template = (
             _("Saved {name}. The previous file is under Earlier versions.")
@@ -228,8 +228,8 @@ class ProjectController:
                 "Saved {name}. Another program had changed the file; its version is under Earlier versions."
             )
         )
-        copy_name = _("{name} (previous version)").format(name=document.name)
-        message = template.format(name=document.name)
+        copy_name = _("{name} (previous version)").format(name=project.name)
+        message = template.format(name=project.name)
         self._show_toast(message, _("Open"), lambda: self.copy(earlier.copy, copy_name))
 
     def _open_tab(self, act: Callable[[], object]) -> None:

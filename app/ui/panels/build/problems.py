@@ -180,8 +180,8 @@ class ProblemsPanel(PanelWidget):
         self.pages = self.make_page_stack(ContentScrollArea(self.empty_label), self._scroll)
 
     def refresh(self) -> None:
-        document = self.session.document
-        program = document.newest_program()
+        project = self.session.document
+        program = project.newest_program()
         if program is None:
             self.status_label.setText(_("Checking"))
             return
@@ -192,8 +192,8 @@ class ProblemsPanel(PanelWidget):
         self.status_label.setText(_("Checked as you build"))
         lines = problem_lines(
             program.problems,
-            document.project.pages if program.absent else (),  # parsed only if robots are missing
-            self._missing_robots(document),
+            project.project.pages if program.absent else (),  # parsed only if robots are missing
+            self._missing_robots(project),
             [link.robot for link in self.session.fleet.connected],
             virtual_models(),
             program.absent,
@@ -205,10 +205,10 @@ class ProblemsPanel(PanelWidget):
             self._problem_lines = lines
             self._show(lines)
 
-    def _missing_robots(self, document: OpenProject) -> list[Robot]:
+    def _missing_robots(self, project: OpenProject) -> list[Robot]:
         # As described in the behaviour, else as last reported on the network.
         robots = {link.name: link.robot for link in self.session.fleet.links if not link.is_connected}
-        return list({**robots, **{robot.name: robot for robot in document.absent_robots}}.values())
+        return list({**robots, **{robot.name: robot for robot in project.absent_robots}}.values())
 
     def _show(self, lines: tuple[ProblemLine, ...]) -> None:
         # Existing rows are reused, so that they don't lose the focus.

@@ -190,15 +190,15 @@ class VariablesPanel(TablePanel[VariableRow]):
     # -- display ------------------------------------------------------------------------------------------
 
     def refresh(self) -> None:
-        runs, document = self.session.runs, self.session.document
-        program = document.newest_program()
+        runs, project = self.session.runs, self.session.document
+        program = project.newest_program()
         if program is None:
             return
-        is_own_run = runs.document is document
+        is_own_run = runs.document is project
         now = self.clock()
         values = runs.values if is_own_run else {}
         state = (
-            document.key,
+            project.key,
             program.variables,
             runs.values_revision if is_own_run else -1,
             is_own_run and runs.active,

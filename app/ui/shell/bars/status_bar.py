@@ -111,15 +111,15 @@ class StatusFormatter:
 
         The entry is empty for a behaviour without changes that wasn't saved yet.
         """
-        document = self._session.document
-        if document.dirty and document.journal_error is not None:
+        project = self._session.document
+        if project.dirty and project.journal_error is not None:
             return "circle-x", _("Not saved · no backup"), "error"
-        if document.dirty:
-            text = _("Not saved · backed up") if document.path is None else _("Unsaved changes · backed up")
+        if project.dirty:
+            text = _("Not saved · backed up") if project.path is None else _("Unsaved changes · backed up")
             return "save", text, None
-        if document.saved_s is None:
+        if project.saved_s is None:
             return EMPTY_ENTRY
-        saved_time = self._clock(document.saved_s)
+        saved_time = self._clock(project.saved_s)
         return "save", _("Saved {clock}").format(clock=f"{saved_time.tm_hour}:{saved_time.tm_min:02d}"), None
 
     def topics(self) -> StatusEntry:

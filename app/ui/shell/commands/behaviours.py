@@ -43,7 +43,7 @@ def show_blocks_panel(shell: Shell) -> None:
 class BehaviourCommands:
     """Handlers of the commands for behaviours and their tabs.
 
-    Methods with a document key as argument return False if there is no such document.
+    Methods with a project key as argument return False if there is no such project.
     """
 
     def __init__(self, shell: Shell, session: Session, files: ProjectController) -> None:
@@ -64,19 +64,19 @@ class BehaviourCommands:
     def _replace_run(self, start: Callable[[], object]) -> None:
         # Shows a toast with the name of the behaviour that was stopped by this run.
         session = self._session
-        runs, current_document, running_document = session.runs, session.document, session.runs.document
+        runs, current_project, running_project = session.runs, session.document, session.runs.document
         was_active = runs.active
         start()
         if (
             was_active
-            and running_document is not None
-            and running_document is not current_document
-            and not runs.is_running_or_pending(running_document)
+            and running_project is not None
+            and running_project is not current_project
+            and not runs.is_running_or_pending(running_project)
         ):
             self._shell.show_toast(
                 _("Stopped “{stopped}” to run “{name}”").format(
-                    stopped=session.documents.title(running_document),
-                    name=session.documents.title(current_document),
+                    stopped=session.documents.title(running_project),
+                    name=session.documents.title(current_project),
                 )
             )
 
@@ -89,9 +89,9 @@ class BehaviourCommands:
         session = self._session
         if session.runs.active:
             return _("another behaviour is running")
-        document = next((each for each in session.documents if session.documents.title(each) == name), None)
-        if document is not None:
-            self._files.show(document)
+        project = next((each for each in session.documents if session.documents.title(each) == name), None)
+        if project is not None:
+            self._files.show(project)
         else:
             path = next((file.path for file in session.settings.recent_files if file.name == name), None)
             if path is None:
@@ -140,44 +140,44 @@ class BehaviourCommands:
 
     def show_tab(self, key: str) -> bool:
         """Show the tab with this key; return False if there is none."""
-        return self._apply_to_document(key, self._files.show)
+        return self._apply_to_project(key, self._files.show)
 
     def close_tab(self, key: str) -> bool:
         """Close the tab with this key; return False if there is none."""
-        return self._apply_to_document(key, self._files.close)
+        return self._apply_to_project(key, self._files.close)
 
     def close_other_tabs(self, key: str) -> bool:
         """Close all tabs except the one with this key; return False if there is no such tab."""
-        documents = self._session.documents
-        return self._apply_to_document(
-            key, lambda document: self._files.close(*(other for other in documents if other is not document))
+        projects = self._session.documents
+        return self._apply_to_project(
+            key, lambda project: self._files.close(*(other for other in projects if other is not project))
         )
 
     def save_tab_as(self, key: str) -> bool:
         """Show a tab and ask for a file to save its behaviour to; return False if there is no such tab."""
 
-        def save_as(document: OpenProject) -> None:
-            self._files.show(document)
+        def save_as(project: OpenProject) -> None:
+            self._files.show(project)
             self._files.save_as()
 
-        return self._apply_to_document(key, save_as)
+        return self._apply_to_project(key, save_as)
 
     def rename_tab(self, key: str, name: str) -> bool:
         """Rename a behaviour; return False if there is no such tab."""
-        return self._apply_to_document(key, lambda document: self._files.rename(document, name))
+        return self._apply_to_project(key, lambda project: self._files.rename(project, name))
 
     def duplicate_tab(self, key: str) -> bool:
         """Open a copy of a behaviour in a new tab; return False if there is no such behaviour."""
-        return self._apply_to_document(key, self._files.duplicate)
+        return self._apply_to_project(key, self._files.duplicate)
 
     def save_tab(self, key: str) -> bool:
         """Show a tab and save its behaviour; return False if there is no such tab."""
 
-        def save(document: OpenProject) -> None:
-            self._files.show(document)
+        def save(project: OpenProject) -> None:
+            self._files.show(project)
             self._files.save()
 
-        return self._apply_to_document(key, save)
+        return self._apply_to_project(key, save)
 
     def show_folder(self, key: str) -> bool:
         """Open the folder of a behaviour's file in the file manager; return False if there is no such tab.
@@ -185,24 +185,24 @@ class BehaviourCommands:
         Nothing is opened for a behaviour that was never saved.
         """
 
-        def show(document: OpenProject) -> None:
-            if document.path is None:
+        def show(project: OpenProject) -> None:
+            if project.path is None:
                 return
-            folder = document.path.parent
+            folder = project.path.parent
             if not open_externally(QUrl.fromLocalFile(str(folder))):
                 self._shell.show_toast(_("The file is in {folder}").format(folder=folder))
 
-        return self._apply_to_document(key, show)
+        return self._apply_to_project(key, show)
 
     def move_tab(self, key: str, position: int) -> bool:
         """Move a tab to another position, counted from 0; return False if there is no such tab."""
-        return self._apply_to_document(key, lambda document: self._files.move(document, position))
+        return self._apply_to_project(key, lambda project: self._files.move(project, position))
 
-    def _apply_to_document(self, key: str, act: Callable[[OpenProject], object]) -> bool:
-        document = self._session.documents.find_by_key(key)
-        if document is not None:
-            act(document)
-        return document is not None
+    def _apply_to_project(self, key: str, act: Callable[[OpenProject], object]) -> bool:
+        project = self._session.documents.find_by_key(key)
+        if project is not None:
+            act(project)
+        return project is not None
 
     def show_earlier_versions(self) -> None:
         """Open the version history of the current behaviour, after its newest edit was applied."""
@@ -213,9 +213,9 @@ class BehaviourCommands:
             self._version_sheet = version_history.VersionHistorySheet(
                 self._shell.theme, self._shell.surface, self._files.copy, self._files.save
             )
-        document = self._session.document
-        title = self._session.documents.title(document)
-        self._version_sheet.show_for(document.project, document.path, title=title)
+        project = self._session.document
+        title = self._session.documents.title(project)
+        self._version_sheet.show_for(project.project, project.path, title=title)
 
     def clear_recent(self) -> None:
         """Clear the list of recent files and show a toast with an Undo button."""

@@ -70,18 +70,18 @@ class ReportCommands:
             session.settings.stored_values(),
             lambda: session.doctor.report(DOCTOR_TIMEOUT_S),
         )
-        documents = session.documents
-        names = [documents.title(each) for each in documents if not each.is_blank]
+        projects = session.documents
+        names = [projects.title(each) for each in projects if not each.is_blank]
         self._sheet.show_for(parts, names, self._reported_work)
 
     def _reported_work(self) -> list[problem_report.ReportedWork]:
-        documents = self._session.documents
+        projects = self._session.documents
         return [
             problem_report.ReportedWork(
-                documents.title(each),
+                projects.title(each),
                 encode_file(each.project),
             )
-            for each in documents
+            for each in projects
             if not each.is_blank
         ]
 

@@ -120,10 +120,10 @@ class RobotCommands:
         link = self._session.fleet.link(swap.replacement)
         if link is None:
             return False
-        document, robot = self._session.document, link.robot
+        project, robot = self._session.document, link.robot
 
         def replace() -> None:
-            if document.replace_missing_robot(swap.missing, robot):
+            if project.replace_missing_robot(swap.missing, robot):
                 message = _("Replaced {other} with {robot}")
                 message = message.format(robot=swap.replacement, other=swap.missing)
                 self._shell.show_toast(message, _("Undo"), lambda: self._shell.request(Undo()))

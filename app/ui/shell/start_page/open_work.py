@@ -27,7 +27,7 @@ class OpenWork:
     """Open behaviour, as shown on the start page.
 
     Attributes:
-        key: Key of its document.
+        key: Key of its project.
         name: Name of the behaviour.
         is_unsaved: True if there are unsaved changes.
         is_running: True while its program runs.
@@ -44,7 +44,7 @@ class OpenWork:
 def open_work(session: Session) -> tuple[OpenWork, ...]:
     """Return the open behaviours that aren't blank, the current one first."""
     current, runs = session.document, session.runs
-    documents = sorted(session.documents, key=lambda each: each is not current)
+    projects = sorted(session.documents, key=lambda each: each is not current)
     return tuple(
         OpenWork(
             each.key,
@@ -53,7 +53,7 @@ def open_work(session: Session) -> tuple[OpenWork, ...]:
             runs.active and runs.document is each,
             str(each.path) if each.path is not None else "",
         )
-        for each in documents
+        for each in projects
         if not each.is_blank
     )
 

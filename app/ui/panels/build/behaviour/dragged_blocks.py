@@ -213,8 +213,8 @@ class BlockDrag:
             self._editor.move_dragged_blocks()
 
     def _on_transferred(self, count: int, how: str, home: str) -> None:
-        document = self._session.document
-        message = transfer_text(count, how, self._session.documents.title(document))
+        project = self._session.document
+        message = transfer_text(count, how, self._session.documents.title(project))
 
         def undo() -> None:
             self._context.request(SelectTab(home))

@@ -208,15 +208,15 @@ class BehaviourPanel(PanelWidget):
 
     def refresh(self) -> None:
         self._ticks += 1
-        documents, document = self.session.documents, self.session.document
-        self._bar.tabs.show_tabs(tab_states(documents, self.session.runs), document.key)
+        projects, project = self.session.documents, self.session.document
+        self._bar.tabs.show_tabs(tab_states(projects, self.session.runs), project.key)
         if self.editor is None and self._can_open_editor:
             self.editor = self._open_editor()
         if self.editor is not None:
-            if self._has_changed("definitions", documents.definitions_revision):
-                self.editor.set_definitions(documents.definitions())
+            if self._has_changed("definitions", projects.definitions_revision):
+                self.editor.set_definitions(projects.definitions())
             self._show_blocks(self.editor)
-        program = document.newest_program()
+        program = project.newest_program()
         if program is not None and program is not self._shown_values.get("facts"):
             self._shown_values["facts"] = program
             self._program_changed(program)
@@ -224,15 +224,15 @@ class BehaviourPanel(PanelWidget):
             self._show_run(self.editor)
 
     def _show_run(self, editor: Editor) -> None:
-        runs, document = self.session.runs, self.session.document
-        is_shown_run = runs.document is document
+        runs, project = self.session.runs, self.session.document
+        is_shown_run = runs.document is project
         if self._has_changed("blocks", (runs.blocks_revision, is_shown_run)):
             editor.highlight(runs.running_blocks if is_shown_run else ())
             editor.mark_stopped(runs.stopped_blocks if is_shown_run else ())
             editor.set_errors(runs.block_errors if is_shown_run else {})
             editor.set_warnings(runs.block_warnings if is_shown_run else {})
         tried = runs.tried_value
-        if self._has_changed("tried", tried) and tried is not None and tried.document is document:
+        if self._has_changed("tried", tried) and tried is not None and tried.document is project:
             editor.show_value(tried.block, tried.text)
         alarms = alarms_of(self.session.fleet.links)
         if self._has_changed("alarms", alarms):
@@ -257,18 +257,18 @@ class BehaviourPanel(PanelWidget):
             self._show_blocks(self.editor)
 
     def _show_blocks(self, editor: Editor) -> None:
-        document = self.session.document
-        now = (document.revision, document.fixes)
-        previous = self._loaded_revisions.get(document.key)
-        if self._has_changed("tab", document.key):
-            editor.show_tab(document.key, document.workspace)
+        project = self.session.document
+        now = (project.revision, project.fixes)
+        previous = self._loaded_revisions.get(project.key)
+        if self._has_changed("tab", project.key):
+            editor.show_tab(project.key, project.workspace)
             for name in ("facts", "blocks"):
                 self._shown_values.pop(name, None)
         if previous is not None and previous[0] != now[0]:
-            editor.load(document.workspace)
+            editor.load(project.workspace)
         elif previous is not None and previous[1] != now[1]:
-            editor.apply_edit(document.workspace)
-        self._loaded_revisions[document.key] = now
+            editor.apply_edit(project.workspace)
+        self._loaded_revisions[project.key] = now
         for key in self._loaded_revisions.keys() - {each.key for each in self.session.documents}:
             del self._loaded_revisions[key]
             editor.close_tab(key)
@@ -529,19 +529,19 @@ class BehaviourPanel(PanelWidget):
             self.editor.show_block(block)
 
     def _on_edited(self, key: str, workspace: WorkspaceJson) -> None:
-        document = self.session.documents.find_by_key(key)
-        if document is not None:
-            was_blank = document.is_blank
-            document.apply_edit(workspace)
-            self.session.tabs.on_edited(document, was_blank=was_blank)
+        project = self.session.documents.find_by_key(key)
+        if project is not None:
+            was_blank = project.is_blank
+            project.apply_edit(workspace)
+            self.session.tabs.on_edited(project, was_blank=was_blank)
 
     def rename_current(self) -> None:
         """Start in-place editing of the name of the active tab."""
         self._bar.tabs.edit(self.session.document.key)
 
     def _name_problem(self, key: str, name: str) -> str:
-        document = self.session.documents.find_by_key(key)
-        return name_problem(name, document.path) if document is not None else ""
+        project = self.session.documents.find_by_key(key)
+        return name_problem(name, project.path) if project is not None else ""
 
     def _key_pressed(self, key: str) -> None:
         self.context.request(PressKey(key))  # the shortcut table knows the command of this key
@@ -614,24 +614,24 @@ def alarms_of(links: Iterable[RobotLink]) -> dict[str, tuple[str, str]]:
     }
 
 
-def tab_states(documents: Iterable[OpenProject], runs: Runs) -> list[TabState]:
+def tab_states(projects: Iterable[OpenProject], runs: Runs) -> list[TabState]:
     """Return the data of the tabs of all open behaviours."""
-    open_documents = list(documents)
+    open_projects = list(projects)
     states = []
-    for document, title in zip(
-        open_documents, unique_titles([(each.name, each.path) for each in open_documents]), strict=True
+    for project, title in zip(
+        open_projects, unique_titles([(each.name, each.path) for each in open_projects]), strict=True
     ):
-        is_running = runs.active and runs.document is document
-        location = str(document.path) if document.path is not None else _("Not saved to a file yet")
+        is_running = runs.active and runs.document is project
+        location = str(project.path) if project.path is not None else _("Not saved to a file yet")
         states.append(
             TabState(
-                document.key,
+                project.key,
                 title,
-                document.dirty,
+                project.dirty,
                 is_running,
                 f"{title}\n{location}",
-                document.name,
-                document.path is not None,
+                project.name,
+                project.path is not None,
             )
         )
     return states

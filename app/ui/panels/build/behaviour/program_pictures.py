@@ -27,14 +27,14 @@ IMAGE_KINDS = (
 )
 
 
-def suggested_path(document: OpenProject) -> Path:
+def suggested_path(project: OpenProject) -> Path:
     """Return the suggested path, without extension, of a file that is exported from a behaviour.
 
     The folder is that of the behaviour's file; for files in Studio's own folder it is the home folder.
     """
-    path = document.path
+    path = project.path
     folder = path.parent if path is not None and path.parent != closed_tabs_folder() else Path.home()
-    return folder / document.name
+    return folder / project.name
 
 
 class ImageCommands:

@@ -191,11 +191,11 @@ class FirstStepsPanel(PanelWidget):
         self._show_delayed_hint()
 
     def _current_state(self) -> TutorialState:
-        runs, document = self.session.runs, self.session.document
-        is_own_run = runs.document is document
-        revision = (document.key, document.revision, document.edits, document.fixes)
+        runs, project = self.session.runs, self.session.document
+        is_own_run = runs.document is project
+        revision = (project.key, project.revision, project.edits, project.fixes)
         if self._cached_blocks[0] != revision:
-            self._cached_blocks = (revision, find_tutorial_blocks(document.workspace, example_block_ids()))
+            self._cached_blocks = (revision, find_tutorial_blocks(project.workspace, example_block_ids()))
             for row in self.rows:
                 row.show_hint(
                     is_detached=bool(row.step.block_suffix)

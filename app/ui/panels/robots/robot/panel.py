@@ -213,8 +213,8 @@ class RobotPanel(OneRobotPanel):
         link, active = self.session.fleet.link(self._robot), self.session.document
         if link is None:
             return ()
-        documents = [active, *(each for each in self.session.documents if each is not active)]
-        return awaited_values((each.workspace for each in documents), link.robot, event, name)
+        projects = [active, *(each for each in self.session.documents if each is not active)]
+        return awaited_values((each.workspace for each in projects), link.robot, event, name)
 
     def _toggle_sound(self) -> None:
         # Speech bubbles are shown even if speech is off.

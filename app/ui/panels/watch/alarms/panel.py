@@ -419,7 +419,7 @@ class AlarmsPanel(PanelWidget):
             return sorted(topic.name for topic in self.session.live.topics.existing_topics())[
                 :MAX_COMPLETIONS
             ]
-        titles = [self.session.documents.title(document) for document in self.session.documents]
+        titles = [self.session.documents.title(project) for project in self.session.documents]
         return list(dict.fromkeys([*titles, *(file.name for file in self.session.settings.recent_files)]))
 
     # -- menus --------------------------------------------------------------------------------------------
