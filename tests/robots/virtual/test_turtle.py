@@ -155,7 +155,7 @@ def watched_turtle(node: nep.Node, clock: VirtualClock):
         assert driver.robot.safe_stop.watchdog_s == WATCHDOG_S
         ears = Ears(other, "Turtle")
         ears.listen("state")
-        eventually(lambda: ears.heard["state"])
+        eventually(lambda: ears.heard["state"] or clock.advance(0.01))
         yield driver.body, ears, clock
 
 
