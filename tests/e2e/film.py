@@ -129,4 +129,4 @@ def with_caption(picture: Picture, words: str) -> Picture:
 
 def topic(studio: Person, name: str) -> tuple[float, float]:
     """Return the position of a topic's row in pixels."""
-    return middle(studio.row("Topics", name)["rect"])
+    return middle(studio.still_row("Topics", name)["rect"])

@@ -16,6 +16,16 @@ FOCUSED = (
     "(it => [it.getAttribute('class') ?? '', it.getAttribute('aria-label') ?? '', it.id]"
     ".join(' | '))(document.activeElement)"
 )
+KEYS_SEEN = """(() => {
+    if (window.nepKeysSeen === undefined) {
+        window.nepKeysSeen = 0;
+        const isModifier = ({key}) => ['Control', 'Shift', 'Alt', 'Meta'].includes(key);
+        const seen = (frames) => frames ? requestAnimationFrame(() => seen(frames - 1)) : ++nepKeysSeen;
+        window.addEventListener('keydown', (event) => isModifier(event) || seen(3), true);
+    }
+    return window.nepKeysSeen;
+})()"""
+"""JavaScript for the number of keys, without modifiers, whose results the page has rendered."""
 DRAGGING = "!!document.querySelector('.blocklyDragging')"
 FIELD = "Find a command, panel, topic, robot or file"
 
@@ -35,12 +45,19 @@ class Fingers:
             self.studio.screen.key(name, held)
             self._pause.wait(PACE_S)
 
+    def _press_in_page(self, key: str, held: Sequence[str] = ()) -> None:
+        """Press a key in the page and wait until its result is rendered, which may take long."""
+        before = until(lambda: self.studio.page(f"[{KEYS_SEEN}]"), "the page answers")
+        self.press(key, held=held)
+        until(lambda: self.studio.page(f"[{KEYS_SEEN}]") != before, f"the page has seen {key}")
+
     def until_on(self, key: str, held: Sequence[str] = (), **wanted: object) -> None:
         """Press a key until a widget with these attributes has the focus."""
         for _ in range(MANY):
             if self.studio.all(focus=True, **wanted):
                 return
             self.press(key, held=held)
+            self.studio.all(kind="MainWindow")  # replies after the window has handled earlier events
         now = [(each["kind"], each["name"]) for each in self.studio.all(focus=True)]
         raise AssertionError(f"{key} does not lead to {wanted}; the keyboard is on {now}")
 
@@ -90,7 +107,7 @@ class Fingers:
         for _ in range(MANY):
             if words in self.focused():
                 return
-            self.press(key, held=held)
+            self._press_in_page(key, held)
         raise AssertionError(f"{key} does not lead to {words!r} but to {self.focused()}")
 
     def put_down(self, kind: str) -> str:
@@ -122,7 +139,7 @@ class Fingers:
         for _ in range(MANY):
             if self.studio.page(f"document.activeElement === {node}"):
                 return
-            self.press("Down")
+            self._press_in_page("Down")
         raise AssertionError(f"Down does not lead to {block} but to {self.focused()}")
 
     def reword(self, says: str, words: str) -> None:

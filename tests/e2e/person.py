@@ -6,11 +6,11 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from tests.e2e.waiting import until
-from tests.e2e.x11 import WHEEL_DOWN, WHEEL_UP, Picture, Screen
+from tests.e2e.waiting import LONG_S, until
+from tests.e2e.x11 import LEFT, WHEEL_DOWN, WHEEL_UP, Picture, Screen
 from tests.still import LOOK
 
-STEP_S = 40.0
+STEP_S = LONG_S
 AGAIN_S = 10.0  # time after which a person would try again
 RUNNING = (0xFF, 0xB3, 0x00)  # the token "running" of the light theme
 Seen = Mapping[str, object]
@@ -93,16 +93,38 @@ class Person:
 
     def click(self, name: str = "", **wanted: object) -> Seen:
         """Wait until a widget is enabled and its layout is stable, then click it."""
+        seen = self.still(name, enabled=True, takes_mouse=True, **wanted)
+        self.screen.click(*middle(seen["rect"]))
+        return seen
+
+    def click_row(self, table: str, first: str, button: int = LEFT) -> None:
+        """Wait until a row of a table exists and its layout is stable, then click it."""
+        self.screen.click(*middle(self.still_row(table, first)["rect"]), button)
+
+    def still(self, name: str = "", **wanted: object) -> Seen:
+        """Wait until a widget is visible and its layout is stable, and return it."""
+        return self._still(
+            lambda: next(iter(self.all(name, **wanted)), None),
+            lambda: f"no {name} {wanted} that stands still; {self._alike(name)}",
+        )
+
+    def still_row(self, table: str, first: str) -> Seen:
+        """Wait until a row with this first cell exists and its layout is stable, and return it."""
+        return self._still(
+            lambda: next((row for row in self.rows(table) if row["texts"][0] == first), None),
+            lambda: f"no row {first!r} in {table} that stands still",
+        )
+
+    @staticmethod
+    def _still(look: Callable[[], Seen | None], what: Callable[[], str]) -> Seen:
         before: list[object] = []
 
         def resting() -> Seen | None:
-            seen = next(iter(self.all(name, enabled=True, takes_mouse=True, **wanted)), None)
+            seen = look()
             stands, before[:] = seen is not None and before == [seen["rect"]], [seen and seen["rect"]]
             return seen if stands else None
 
-        seen = until(resting, lambda: f"no {name} {wanted} that stands still; {self._alike(name)}")
-        self.screen.click(*middle(seen["rect"]))
-        return seen
+        return until(resting, what)
 
     def _alike(self, name: str) -> str:
         """Return kind, state and position of the widgets of this name, for the message of a failed test."""

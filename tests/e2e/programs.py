@@ -11,10 +11,10 @@ import threading
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from tests.e2e.waiting import until
+from tests.e2e.waiting import LONG_S, until
 
 ROOT = Path(__file__).resolve().parents[2]
-END_S = 30.0
+END_S = 60.0
 
 
 class Program:
@@ -46,7 +46,7 @@ class Program:
         with self._news:
             return tuple(self._lines)
 
-    def says(self, words: str, within_s: float = 20.0) -> str:
+    def says(self, words: str, within_s: float = LONG_S) -> str:
         """Wait for a line of output with these words and return it."""
         return until(
             lambda: next((line for line in self.lines if words in line), ""),

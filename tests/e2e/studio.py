@@ -20,7 +20,7 @@ from tests.e2e.x11 import Screen
 
 ROOT = Path(__file__).resolve().parents[2]
 PROBE = Path(__file__).parent / "window_probe"
-START_S, END_S = 60.0, 30.0
+START_S, END_S = 120.0, 60.0
 
 
 class Studio(Person):
@@ -101,6 +101,15 @@ class Studio(Person):
     def log(self) -> str:
         """Last 3000 characters of its output."""
         return (self.home / "studio.log").read_text("utf-8", "replace")[-3000:]
+
+    def use_virtual_pepper(self, block: str = "started") -> None:
+        """Choose the virtual Pepper once a block is shown, and wait until it is ready.
+
+        Loading the blocks closes an open menu, whose entry would be missed.
+        """
+        self.spot(f"[data-id={block}]")
+        self.choose("Robots", "Use the virtual Pepper")
+        self.says("Pepper ready")
 
     # -- processes of Studio ----------------------------------------------------------------------
 

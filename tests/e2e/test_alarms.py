@@ -7,20 +7,18 @@ import threading
 import pytest
 
 import nep
-from tests.e2e.person import middle
 from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
 from tests.e2e.x11 import RIGHT
 
-pytestmark = pytest.mark.timeout(240)
+pytestmark = pytest.mark.timeout(400)
 
 
 def test_alarm_created_by_right_click_shows_a_banner_and_clears_by_itself(studio: Studio) -> None:
     with nep.node("talker", wait_s=60.0) as node:
         publisher = node.new_pub("/distance", "json")
         studio.screen.key("2", ["Alt"])
-        row = studio.row("Topics", "/distance")
-        studio.screen.click(*middle(row["rect"]), RIGHT)
+        studio.click_row("Topics", "/distance", RIGHT)
         studio.pick("New alarm")
         studio.find("/distance is silent for 2 s", kind="AlarmRow")
         studio.says("/distance has been silent for")

@@ -21,7 +21,7 @@ from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
 from tests.nep.recordings.messages import TestClock, json_message, limits
 
-pytestmark = pytest.mark.timeout(240)
+pytestmark = pytest.mark.timeout(400)
 TOOLS = ("Dock", "TitleTab", "_Segment", "StatusItem")
 
 
@@ -78,6 +78,18 @@ def places(studio: Studio) -> dict[tuple[str, str, str], Sequence[float]]:
     return found
 
 
+def settled_places(studio: Studio) -> dict[tuple[str, str, str], Sequence[float]]:
+    """Return the rectangles of panels and buttons once they no longer change."""
+    seen: list[dict[tuple[str, str, str], Sequence[float]]] = []
+
+    def still() -> bool:
+        seen.append(places(studio))
+        return len(seen) > 2 and seen[-1] == seen[-2] == seen[-3]
+
+    until(still, "the panels stand still")
+    return seen[-1]
+
+
 def height_of_timeline(studio: Studio) -> float:
     """Open the selected recording and return the height of the Timeline once it no longer changes."""
     seen: list[float] = []
@@ -104,9 +116,10 @@ def test_alerts_cover_no_panel_and_panels_keep_their_size(
     studio.find("Use the virtual robot", enabled=True)
     fingers.press("2", held=["Alt"])
     studio.screen.move(700, 500)  # over a panel, so that any shift of the layout would be noticed
-    banner = studio.find(kind="Banner")
-    assert all(str(port) in str(banner["name"]) for port in held), "one alert for all ports"
-    before = places(studio)
+    words = lambda: str(studio.find(kind="Banner")["name"])  # noqa: E731
+    until(lambda: all(str(port) in words() for port in held), "one alert for all ports")
+    before = settled_places(studio)
+    banner = studio.still(kind="Banner")
     assert not [each for each, rect in before.items() if overlap(rect, banner["rect"])]
     fingers.until_on("Tab", held=["Shift"], kind="StatusItem", name="1 alert")
     fingers.press("Return")
@@ -114,28 +127,27 @@ def test_alerts_cover_no_panel_and_panels_keep_their_size(
 
     fingers.press("Home", held=["Alt"])
     studio.says("What would you like to do?")
-    assert not studio.all(kind="Banner"), "ports are told to developers alone"
+    until(lambda: not studio.all(kind="Banner"), "ports are told to developers alone")
     fingers.press("1", held=["Alt"])
     studio.find(kind="RunBar")
-    assert not studio.all(kind="Banner")
-    assert not studio.all("1 alert")
+    until(lambda: not studio.all(kind="Banner") and not studio.all("1 alert"), "nor in this layout")
 
     fingers.press("2", held=["Alt"])
     studio.click("Console", kind="TitleTab")
     studio.click("1 alert", kind="StatusItem")
     studio.find(kind="AlertsPanel")
-    before = places(studio)
+    before = settled_places(studio)
     studio.click("Dismiss")
     until(lambda: not studio.all(kind="Banner"), "the banner goes")
-    assert places(studio) == before, "no strip is left, and nothing moved"
+    until(lambda: places(studio) == before, "no strip is left, and nothing moved")
 
     with adder(address):
         fingers.do("call a serv", "Call a service")
         studio.click("Arm and call")
         studio.says("replied in ")
         panel, answer = (
-            studio.find(kind="ServicesPanel")["rect"],
-            studio.find("Reply", kind="TableView")["rect"],
+            studio.still(kind="ServicesPanel")["rect"],
+            studio.still("Reply", kind="TableView")["rect"],
         )
         assert answer[3] > 60
         assert panel[0] <= answer[0] < answer[0] + answer[2] <= panel[0] + panel[2]

@@ -14,7 +14,7 @@ from tests.e2e.test_carrying import PATH, carry
 from tests.e2e.test_tabs import SHOWN, shown, tabs
 from tests.e2e.waiting import until
 
-pytestmark = pytest.mark.timeout(170)
+pytestmark = pytest.mark.timeout(400)
 PACKED = ".nepTab:not([hidden]) .nepPacked .blocklyBlockCanvas > .blocklyBlock"
 SENTENCES = f"{SHOWN}.querySelectorAll('.blocklyBlockCanvas .robot_pepper_do_say').length"
 TITLE = "document.querySelector('.nepBackpack').title"
@@ -30,7 +30,7 @@ def test_backpack_carries_blocks_between_files_and_persists_after_a_restart(
     greeting = write(tmp_path / "Greeting.nepb", started(say("One", say("Two", say("Three")))))
     quiz = write(tmp_path / "Quiz.nepb", started(say("Four")))
     studio = start(str(quiz), str(greeting))
-    until(lambda: "say Three" in shown(studio), "the second shows", 30)
+    until(lambda: "say Three" in shown(studio), "the second shows")
     before = shown(studio)
     carry(studio, "say Two", *on_the_backpack(studio))
     studio.screen.release()
@@ -50,6 +50,6 @@ def test_backpack_carries_blocks_between_files_and_persists_after_a_restart(
     assert studio.quit() == 0
 
     again = start(str(quiz))
-    until(lambda: again.page(TITLE) == "Backpack (1)", "it is full at the next start", 40)
+    until(lambda: again.page(TITLE) == "Backpack (1)", "it is full at the next start")
     assert again.page(SENTENCES) == 3
     assert again.quit() == 0

@@ -13,7 +13,7 @@ from tests.e2e.behaviours import block, forever, number, say, started, turn, wri
 from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
 
-pytestmark = pytest.mark.timeout(240)
+pytestmark = pytest.mark.timeout(400)
 
 
 @pytest.fixture
@@ -22,9 +22,7 @@ def with_robot(start: Callable[..., Studio], tmp_path: Path) -> Callable[[dict],
 
     def open_script(script: dict) -> Studio:
         studio = start(str(write(tmp_path / "Mine.nepb", script)))
-        studio.choose("Robots", "Use the virtual Pepper")
-        studio.says("Pepper ready", 40)
-        studio.spot("[data-id=started]")
+        studio.use_virtual_pepper()
         return studio
 
     return open_script
@@ -34,8 +32,9 @@ def test_runtime_error_is_shown_as_a_sentence_on_its_block(with_robot: Callable[
     walk = block("robot_pepper_do_walk", fields={"ROBOT": "Pepper"}, DISTANCE=number(2))
     studio = with_robot(started(walk))
     studio.click("Run", kind="RunButton")
-    until(lambda: studio.outlined("error") == ["walk"], "the block has its error", 40)
-    assert "something is in the way" in str(studio.page("document.body.textContent"))
+    until(lambda: studio.outlined("error") == ["walk"], "the block has its error")
+    words = "something is in the way"
+    until(lambda: words in str(studio.page("document.body.textContent")), "it says why")
     studio.says("because of an error")
 
 
@@ -69,7 +68,7 @@ def test_generated_python_can_be_viewed_and_copied(with_robot: Callable[[dict], 
 
 def test_example_from_the_start_page_runs_to_completion(studio: Studio) -> None:
     studio.click("Use the virtual robot")
-    studio.says("Pepper ready", 40)
+    studio.says("Pepper ready")
     studio.choose("File", "Start page")
     card = studio.find(kind="ExampleCard")
     studio.screen.click(card["rect"][0] + 60, card["rect"][1] + 60)
@@ -90,7 +89,7 @@ def test_crashed_robot_is_reported_and_runs_its_blocks_again_after_a_restart(
     until(lambda: "not connected" in str(studio.page("document.body.textContent")), "the toolbox says so")
     studio.says("Pepper isn't connected, so ")
     studio.click("Start a virtual Pepper")
-    studio.says("Pepper ready", 40)
+    studio.says("Pepper ready")
     studio.open_category("Movement")
     studio.screen.key("Escape")
     studio.click("Run", kind="RunButton")

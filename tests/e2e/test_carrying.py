@@ -13,7 +13,7 @@ from tests.e2e.studio import Studio
 from tests.e2e.test_tabs import SHOWN, shown, tabs
 from tests.e2e.waiting import until
 
-pytestmark = pytest.mark.timeout(170)
+pytestmark = pytest.mark.timeout(400)
 ACCENT = (0x2F, 0x4F, 0xD0)  # the token "accent" of the light theme
 SENTENCES = f"{SHOWN}.querySelectorAll('.blocklyBlockCanvas .robot_pepper_do_say').length"
 SELECTED = f"[...{SHOWN}.querySelectorAll('.blocklyBlockCanvas .blocklySelected')].map(e => e.textContent)"
@@ -27,6 +27,7 @@ def carry(studio: Studio, block: str, x: float, y: float) -> None:
     studio.screen.move(left + 12, top + 18)
     studio.screen.press()
     studio.screen.glide(left + 60, top + 40, 6)
+    until(lambda: studio.page("!!document.querySelector('.blocklyDragging')"), "the page has seen it held")
     studio.screen.glide(x, y)
 
 
@@ -45,8 +46,8 @@ def studio(start: Callable[..., Studio], tmp_path: Path) -> Studio:
     greeting = write(tmp_path / "Greeting.nepb", started(say("One", say("Two", say("Three")))))
     quiz = write(tmp_path / "Quiz.nepb", started(say("Four")))
     made = start(str(quiz), str(greeting))
-    until(lambda: tabs(made) == ["Quiz", "Greeting"], "the files are open", 30)
-    until(lambda: "say Three" in shown(made), "the second shows", 30)
+    until(lambda: tabs(made) == ["Quiz", "Greeting"], "the files are open")
+    until(lambda: "say Three" in shown(made), "the second shows")
     return made
 
 
@@ -54,7 +55,7 @@ def test_blocks_dropped_on_another_tab_are_moved_to_that_tab(studio: Studio) -> 
     before, alone = shown(studio), {"started", "say Four", "text Four"}
     carry(studio, "say Two", *place_of(studio, "Quiz"))
     until(lambda: ringed(studio, "Quiz"), "a ring is round the tab that would take it")
-    assert not ringed(studio, "Greeting")
+    until(lambda: not ringed(studio, "Greeting"), "and round no other")
     until(lambda: "say Four" in shown(studio), "it has opened meanwhile")
     studio.screen.release()
     studio.says("Moved 2 blocks to Quiz")
@@ -62,7 +63,7 @@ def test_blocks_dropped_on_another_tab_are_moved_to_that_tab(studio: Studio) -> 
     until(lambda: alone < shown(studio), "its tab is open")
     until(lambda: studio.page(SENTENCES) == 3, "with both blocks")
     until(lambda: len(studio.page(SELECTED) or []) == 1, "what came is selected")
-    assert not ringed(studio, "Quiz")
+    until(lambda: not ringed(studio, "Quiz"), "the ring goes")
     until(lambda: tabs(studio) == ["Quiz, not saved", "Greeting, not saved"], "both are edited")
     studio.click("Undo", kind="Button")
     until(lambda: shown(studio) == before, "they are back in their stack")

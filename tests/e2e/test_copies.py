@@ -12,7 +12,7 @@ from tests.e2e.studio import Studio
 from tests.e2e.test_tabs import shown, tabs
 from tests.e2e.waiting import until
 
-pytestmark = pytest.mark.timeout(120)
+pytestmark = pytest.mark.timeout(400)
 
 
 def test_copied_blocks_are_pasted_after_a_click_on_another_tab(
@@ -20,8 +20,8 @@ def test_copied_blocks_are_pasted_after_a_click_on_another_tab(
 ) -> None:
     files = [write(tmp_path / f"{name}.nepb", started(say(name))) for name in ("One", "Two")]
     studio = start(str(files[0]), str(files[1]))
-    until(lambda: tabs(studio) == ["One", "Two"], "both files are open", 30)
-    until(lambda: "say Two" in shown(studio), "the second shows", 30)
+    until(lambda: tabs(studio) == ["One", "Two"], "both files are open")
+    until(lambda: "say Two" in shown(studio), "the second shows")
     studio.point('.nepTab:not([hidden]) [data-id="say Two"] > .blocklyPath', dx=8, dy=20)
     until(
         lambda: studio.page("document.querySelector('.nepTab:not([hidden]) .blocklySelected')?.dataset.id"),

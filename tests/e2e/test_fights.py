@@ -12,7 +12,7 @@ from tests.e2e.film import Film
 from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
 
-pytestmark = pytest.mark.timeout(240)
+pytestmark = pytest.mark.timeout(400)
 BOTH = "both move Pepper at the same time"
 REPLACED = "was replaced by"
 
@@ -34,8 +34,7 @@ def test_conflicting_scripts_are_marked_and_fixed_from_problems(
     path = write(tmp_path / "Fight.nepb", script(turn(300), "one", 56), script(walk, "other", 480))
     studio = start(str(path), "--theme", theme)
     film = Film(studio, f"fight-{theme}", tmp_path)
-    studio.choose("Robots", "Use the virtual Pepper")
-    studio.says("Pepper ready", 40)
+    studio.use_virtual_pepper("one")
     with film.step("Problems say that two scripts fight"):
         studio.says(BOTH)
     with film.step("The loser says so at its block while the winner goes on"):

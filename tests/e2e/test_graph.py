@@ -12,7 +12,7 @@ from tests.e2e.programs import Program
 from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
 
-pytestmark = pytest.mark.timeout(240)
+pytestmark = pytest.mark.timeout(400)
 TALK = """
 import sys, threading
 import nep
@@ -47,9 +47,8 @@ def test_graph_navigation_leads_from_a_topic_publisher_to_its_subscribers(
     with Program(str(script)) as program:
         program.says("talks", 60)
         fingers.do("Graph", "Graph")
-        canvas = studio.find("Graph of nodes")
         studio.says("nodes, 1 topic")
-        left, top, wide, high = canvas["rect"]
+        left, top, wide, high = studio.still("Graph of nodes")["rect"]
         studio.screen.click(left + wide / 2, top + high - 10)  # on the empty canvas
         studio.find("Graph of nodes", focus=True)
 

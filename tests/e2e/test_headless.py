@@ -13,9 +13,9 @@ import pytest
 import nep
 from nep.masters.master import Master
 from tests.e2e.behaviours import forever, say, started, turn, write
-from tests.e2e.programs import Program
+from tests.e2e.programs import END_S, Program
 
-pytestmark = pytest.mark.timeout(240)
+pytestmark = pytest.mark.timeout(400)
 
 
 @pytest.fixture
@@ -29,10 +29,10 @@ def run(file: Path, *arguments: str) -> Program:
 
 
 def test_ctrl_c_stops_the_program_and_the_robot(pepper: Program, tmp_path: Path) -> None:
-    with run(write(tmp_path / "Turning.nepb", started(forever(turn(300)))), "--robot-wait", "30") as program:
-        program.says("Pepper turns left by 300°", 40)
+    with run(write(tmp_path / "Turning.nepb", started(forever(turn(300)))), "--robot-wait", "60") as program:
+        program.says("Pepper turns left by 300°")
         program.interrupt()
-        assert program.wait(10) == 130, program.lines
+        assert program.wait(END_S) == 130, program.lines
         program.says("Pepper stopped (")
     with nep.node("listener") as node:
         states = node.new_sub("/Pepper/state", "json")
@@ -43,12 +43,12 @@ def test_ctrl_c_stops_the_program_and_the_robot(pepper: Program, tmp_path: Path)
 
 def test_missing_robot_is_reported_with_exit_code_3(master: Master, tmp_path: Path) -> None:
     with run(write(tmp_path / "Hello.nepb", started(say("Hello"))), "--robot-wait", "0.5") as program:
-        assert program.wait(20) == 3, program.lines
+        assert program.wait(END_S) == 3, program.lines
         program.says("Not found: Pepper. Switch on the robots or start virtual ones.")
 
 
 def test_invalid_behaviour_file_exits_with_code_2_without_traceback(master: Master, tmp_path: Path) -> None:
     (tmp_path / "x.nepb").write_text("{", encoding="utf-8")
     with run(tmp_path / "x.nepb") as program:
-        assert program.wait(20) == 2, program.lines
+        assert program.wait(END_S) == 2, program.lines
         assert "Traceback" not in "\n".join(program.lines)

@@ -6,11 +6,10 @@ from collections.abc import Callable
 
 import pytest
 
-from tests.e2e.person import middle
 from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
 
-pytestmark = pytest.mark.timeout(240)
+pytestmark = pytest.mark.timeout(400)
 
 
 def panels(studio: Studio) -> dict[str, tuple[int, ...]]:
@@ -79,13 +78,13 @@ def test_inspected_topic_of_the_developer_layout_is_restored_after_a_restart(
 ) -> None:
     studio = start()
     studio.click("Use the virtual robot")
-    studio.says("Pepper ready", 40)
+    studio.says("Pepper ready")
     studio.click("Developer")
-    studio.screen.click(*middle(studio.row("Topics", "/Pepper/pose")["rect"]))
+    studio.click_row("Topics", "/Pepper/pose")
     until(lambda: "theta" in studio.values("Newest message"), "the inspector shows it")
     assert studio.quit() == 0
     again = start()
     again.click("Use the virtual robot")
-    again.says("Pepper ready", 40)
+    again.says("Pepper ready")
     again.click("Developer")
     until(lambda: "theta" in again.values("Newest message"), "the inspector shows it again")

@@ -12,7 +12,7 @@ from tests.e2e.studio import Studio
 from tests.e2e.test_tabs import tabs
 from tests.e2e.waiting import until
 
-pytestmark = pytest.mark.timeout(170)
+pytestmark = pytest.mark.timeout(400)
 
 BLOCKS = "document.querySelectorAll('.nepTab:not([hidden]) .blocklyBlockCanvas .blocklyDraggable').length"
 

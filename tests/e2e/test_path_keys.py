@@ -12,7 +12,7 @@ from tests.e2e.fingers import Fingers
 from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
 
-pytestmark = pytest.mark.timeout(230)
+pytestmark = pytest.mark.timeout(400)
 
 
 def test_user_journey_from_start_page_to_saved_behaviour_by_keyboard(
@@ -30,7 +30,7 @@ def test_user_journey_from_start_page_to_saved_behaviour_by_keyboard(
         fingers.until_on("Tab", ["Shift"], name="Use the virtual robot")
     with film.step("Enter: the virtual robot comes"):
         fingers.press("Return")
-        studio.says("Pepper ready", 40)
+        studio.says("Pepper ready")
         studio.says("virtual, ready")
     with film.step("Ctrl+N: a new behaviour; its blocks are found by their words"):
         fingers.press("n", held=["Ctrl"])
@@ -48,18 +48,18 @@ def test_user_journey_from_start_page_to_saved_behaviour_by_keyboard(
 def run(studio: Studio, film: Film, fingers: Fingers) -> None:
     with film.step("F5: the block that runs now glows"):
         fingers.press("F5")
-        until(lambda: studio.outlined("running"), "a block glows", 40)
+        until(lambda: studio.outlined("running"), "a block glows")
     with film.step("F8: the program waits, the robot is paused"):
         fingers.press("F8")
         studio.says("Paused at “")
     with film.step("F10: one block"):
-        before = studio.outlined("stopped")
+        before = until(lambda: studio.outlined("stopped"), "the next block is outlined")
         fingers.press("F10")
         until(lambda: studio.outlined("stopped") not in ([], before), "another block is next")
     with film.step("F12: every robot has replied"):
         fingers.press("F12")
         studio.says("Pepper stopped (")
-        assert not studio.outlined("running")
+        until(lambda: not studio.outlined("running"), "nothing glows")
 
 
 def look_at_topics(studio: Studio, film: Film, fingers: Fingers) -> None:

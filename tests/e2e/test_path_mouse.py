@@ -15,7 +15,7 @@ from tests.e2e.studio import Studio
 from tests.e2e.teacher_session import Hands, of, words_of
 from tests.e2e.waiting import until
 
-pytestmark = pytest.mark.timeout(230)
+pytestmark = pytest.mark.timeout(400)
 
 
 def colours_of(studio: Studio, block: str) -> str:
@@ -37,7 +37,7 @@ def test_user_journey_from_start_page_to_saved_behaviour_by_mouse(
         studio.says("What would you like to do?")
     with film.step("One click: the virtual robot comes"):
         studio.click("Use the virtual robot")
-        studio.says("Pepper ready", 40)
+        studio.says("Pepper ready")
         studio.says("virtual, ready")
     with film.step("A new behaviour, by the menu"):
         studio.choose("File", "New behaviour")
@@ -61,7 +61,7 @@ def test_user_journey_from_start_page_to_saved_behaviour_by_mouse(
         until(lambda: "#ff3b30" in colours_of(studio, light), "the block has it")
     with film.step("Run: the block that runs now glows"):
         studio.click("Run", kind="RunButton")
-        until(lambda: studio.outlined("running"), "a block glows", 40)
+        until(lambda: studio.outlined("running"), "a block glows")
         studio.find("Pause", kind="RunButton", enabled=True)
     with film.step("Pause: the program waits, the robot is paused"):
         studio.click("Pause", kind="RunButton")
@@ -73,7 +73,7 @@ def test_user_journey_from_start_page_to_saved_behaviour_by_mouse(
     with film.step("Stop: every robot has replied"):
         studio.click("Stop", kind="StopButton")
         studio.says("Pepper stopped (")
-        assert not studio.outlined("running")
+        until(lambda: not studio.outlined("running"), "nothing glows")
     see_what_the_robot_says(studio, film, mouse)
     save(studio, film, home)
     assert len(film.pictures) >= 15

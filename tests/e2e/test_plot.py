@@ -15,7 +15,7 @@ from tests.e2e.person import middle
 from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
 
-pytestmark = [pytest.mark.long, pytest.mark.timeout(240)]
+pytestmark = [pytest.mark.long, pytest.mark.timeout(400)]
 
 
 @contextmanager
@@ -57,16 +57,16 @@ def test_plot_shows_a_value_dragged_from_the_inspector_and_a_typed_field_path(
 ) -> None:
     studio.find("Use the virtual robot", enabled=True)
     studio.screen.key("2", held=["Alt"])
-    studio.says(f"Master {address}", 40)
+    studio.says(f"Master {address}")
     with odometry(address):
-        studio.screen.click(*middle(studio.row("Topics", "/odom")["rect"]))
+        studio.click_row("Topics", "/odom")
         until(lambda: "speed" in studio.values("Newest message"), "the inspector shows the message")
         studio.click("Panels")
         studio.pick("Plot")
         studio.says("No curves yet")
-        studio.screen.move(*middle(studio.row("Newest message", "speed")["rect"]))
+        studio.screen.move(*middle(studio.still_row("Newest message", "speed")["rect"]))
         studio.screen.press()
-        x, y = middle(studio.find("Add a curve", kind="AddCurveField")["rect"])
+        x, y = middle(studio.still("Add a curve", kind="AddCurveField")["rect"])
         studio.screen.glide(x + 20, y + 200)
         studio.screen.release()
         until(lambda: curves(studio) == ["/odom.speed"], "the value is plotted")

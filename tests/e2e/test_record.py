@@ -9,7 +9,7 @@ from nep.recordings.reader import Recording
 from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
 
-pytestmark = pytest.mark.timeout(240)
+pytestmark = pytest.mark.timeout(400)
 
 
 def test_recording_contains_every_message_published_meanwhile(studio: Studio) -> None:

@@ -9,14 +9,14 @@ import pytest
 
 from app.robots.client import rize
 from tests.e2e.behaviours import block, number, say, started, write
-from tests.e2e.programs import Program
+from tests.e2e.programs import END_S, Program
 from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
 from tests.interop.conftest import CACHE, Peers, fixed_ports, peers, start_master
 from tests.interop.conftest import Program as Peer
 
 __all__ = ["fixed_ports", "peers"]
-pytestmark = [pytest.mark.ports, pytest.mark.interop, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.ports, pytest.mark.interop, pytest.mark.timeout(400)]
 ROOT = Path(__file__).resolve().parents[2]
 VERSION = "0.5.3.5"
 
@@ -50,9 +50,9 @@ def heard(driver: Peer) -> None:
 
 
 def test_blocks_drive_the_robot_without_a_window(driver: Peer, tmp_path: Path) -> None:
-    words = ("-m", "app", "run", str(turtle(tmp_path)), "--robot-wait", "30", "--allow-moving")
+    words = ("-m", "app", "run", str(turtle(tmp_path)), "--robot-wait", "60", "--allow-moving")
     with Program(*words) as program:
-        assert program.wait(60) == 0, program.lines
+        assert program.wait(END_S) == 0, program.lines
         program.says("Turtle: Stop sent; this robot can't confirm")
     heard(driver)
 
@@ -61,7 +61,7 @@ def test_robot_is_found_in_the_window_and_driven_by_blocks(
     driver: Peer, start: Callable[..., Studio], tmp_path: Path
 ) -> None:
     studio = start(str(turtle(tmp_path)))
-    studio.says("Turtle ready", 40)
+    studio.says("Turtle ready")
     studio.open_category("Speech")
     studio.screen.key("Escape")
     studio.click("Run", kind="RunButton")

@@ -11,7 +11,7 @@ from tests.e2e.programs import ROOT, Program
 from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
 
-pytestmark = pytest.mark.timeout(240)
+pytestmark = pytest.mark.timeout(400)
 
 
 def press(studio: Studio, name: str) -> None:
@@ -40,7 +40,7 @@ def table(start: Callable[..., Studio], tmp_path: Path) -> Iterator[Studio]:
     slow = tmp_path / "table.py"
     slow.write_text(fast.replace("call.wait(0.01)", "call.wait(1)"), "utf-8")
     with Program(str(slow), "--name", "Table", environment=network):
-        studio.says("Table ready", 40)
+        studio.says("Table ready")
         studio.choose("Robots", "Try what a robot can do")
         studio.find("Try turn")
         yield studio
@@ -69,7 +69,7 @@ def test_real_robot_moves_only_after_permission_which_is_requested_once(table: S
 def test_virtual_turtle_connects_and_moves_without_a_motion_permission(start: Callable[..., Studio]) -> None:
     studio = start()
     studio.choose("Robots", "Use the virtual Turtle")
-    studio.says("Turtle ready", 40)
+    studio.says("Turtle ready")
     studio.choose("Robots", "Try what a robot can do")
     studio.find("Robots in their room")
     press(studio, "Try turn")  # virtual robots need no permission

@@ -12,7 +12,7 @@ from tests.e2e.behaviours import forever, say, started, turn, write
 from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
 
-pytestmark = pytest.mark.timeout(240)
+pytestmark = pytest.mark.timeout(400)
 LATER = "Your changes take effect at the next run"
 
 
@@ -45,10 +45,7 @@ def turning(start: Callable[..., Studio], tmp_path: Path) -> Studio:
     speech = {**say("Round and round"), "x": 420, "y": 56}
     path = write(tmp_path / "Turning.nepb", started(forever(turn(300))), speech)
     studio = start(str(path))
-    studio.choose("Robots", "Use the virtual Pepper")
-    studio.says("Pepper is starting")
-    studio.says("Pepper ready", 40)
-    studio.spot("[data-id=turn]")
+    studio.use_virtual_pepper("turn")
     studio.click("Run", kind="RunButton")
     until(lambda: "turn" in studio.outlined("running"), "the block glows")
     return studio
@@ -72,6 +69,8 @@ def test_edit_during_a_run_shows_when_it_applies(turning: Studio) -> None:
     (first,) = programs(turning)
     assert not turning.all(kind="RunStateLabel", name=LATER)
     turning.point("[data-id='text Round and round'] .blocklyInputField", dx=10, dy=10)
+    typing = "!!document.activeElement?.classList.contains('blocklyHtmlInput')"
+    until(lambda: turning.page(typing), "the text is edited")
     turning.screen.type("Hello")
     turning.screen.key("Return")
     turning.point("[data-id=turn] > .blocklyPath", dx=14, dy=14)

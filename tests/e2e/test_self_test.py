@@ -15,7 +15,7 @@ from tests.e2e.programs import Program
 from tests.e2e.waiting import until
 from tests.e2e.x11 import Screen
 
-pytestmark = pytest.mark.timeout(240)
+pytestmark = pytest.mark.timeout(400)
 ALWAYS = ("program", "window", "master", "robot", "behaviour", "run", "moves", "stop", "picture", "close")
 NO_ROBOT = """
 import sys
@@ -78,7 +78,7 @@ class Tried:
 
     def nothing_is_left(self) -> None:
         """Wait until all processes have ended; those of the web engine end a moment after their parent."""
-        until(lambda: not self.left(), lambda: f"all have ended: {self.left()}", 20)
+        until(lambda: not self.left(), lambda: f"all have ended: {self.left()}")
 
 
 @pytest.fixture(scope="module")
@@ -88,8 +88,8 @@ def both(screen: Screen, tmp_path_factory: pytest.TempPathFactory) -> Iterator[t
     web = Tried(screen, folder / "with")
     plain = Tried(screen, folder / "without", "--no-web", begin=("-c", NO_WEB))
     with web.program, plain.program:
-        web.program.wait(200)
-        plain.program.wait(200)
+        web.program.wait(360)
+        plain.program.wait(360)
         yield web, plain
 
 
@@ -133,7 +133,7 @@ def test_failed_step_is_reported_before_its_time_limit_with_its_reason(
 ) -> None:
     tried = Tried(screen, tmp_path / "out", "--no-web", begin=("-c", NO_ROBOT))
     with tried.program as program:
-        assert program.wait(100) == 1, program.lines
+        assert program.wait(360) == 1, program.lines
         assert any("The virtual robot Pepper stopped unexpectedly." in line for line in program.lines)
     report, robot = tried.report, tried.steps()["robot"]
     assert not report["ok"]

@@ -15,7 +15,7 @@ from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
 from tests.e2e.x11 import RIGHT
 
-pytestmark = pytest.mark.timeout(240)
+pytestmark = pytest.mark.timeout(400)
 
 
 @pytest.fixture
@@ -26,9 +26,7 @@ def turning(start: Callable[..., Studio], tmp_path: Path) -> Studio:
     light = {**block("robot_pepper_do_light", fields=lights), "x": 56, "y": 360}
     path = write(tmp_path / "Turning.nepb", started(forever(turn(300))), speech, light)
     studio = start(str(path))
-    studio.choose("Robots", "Use the virtual Pepper")
-    studio.says("Pepper ready", 40)
-    studio.spot("[data-id=turn]")
+    studio.use_virtual_pepper("turn")
     studio.click("Run", kind="RunButton")
     until(lambda: "turn" in studio.outlined("running"), "the block glows")
     return studio
@@ -49,7 +47,7 @@ def stands_still(studio: Studio) -> None:
     assert not any(state["moving"] for state in heard)
     assert len({state["theta_deg"] for state in heard}) == 1
     until(lambda: not studio.programs(), "the program's process has ended")
-    assert not studio.outlined("running")
+    until(lambda: not studio.outlined("running"), "nothing glows any more")
 
 
 def stands_still_again(studio: Studio) -> None:
@@ -63,7 +61,7 @@ def test_f12_in_the_web_view_stops(turning: Studio) -> None:
     until(lambda: turning.page("document.hasFocus()"), "the web view has the keyboard")
     turning.screen.key("F12")
     stands_still(turning)
-    assert turning.outlined("stopped")
+    until(lambda: turning.outlined("stopped"), "the block where it stopped is outlined")
 
 
 def test_ctrl_period_while_a_block_text_is_edited_stops(turning: Studio) -> None:
@@ -89,8 +87,8 @@ def test_f12_during_the_drag_of_a_field_stops(turning: Studio) -> None:
     turning.click("Filter topics")
     turning.screen.type("pose")
     until(lambda: len(turning.rows("Topics")) == 1, "only the topic of the pose is listed")
-    turning.screen.click(*middle(turning.row("Topics", "/Pepper/pose")["rect"]))
-    x, y = middle(turning.row("Newest message", "theta")["rect"])
+    turning.click_row("Topics", "/Pepper/pose")
+    x, y = middle(turning.still_row("Newest message", "theta")["rect"])
     turning.screen.move(x, y)
     turning.screen.press()
     turning.screen.glide(x + 200, y + 100)
@@ -197,6 +195,7 @@ def test_stop_key_and_one_click_on_stop_work_while_a_menu_sheet_or_name_field_is
     answers: list[nep.Message] = []
     with nep.node("listener", master=turning.master) as node:
         node.new_sub("/Pepper/answer", "robot/answer", sink=answers.extend)
+        until(lambda: answers, "the answers to the turns are heard: a stop is answered only once")
         opened = (
             a_menu_in_a_menu, the_menu_of_a_tab, the_menu_of_a_block, a_menu_in_the_palette, settings,
             a_name_that_is_typed,
@@ -231,7 +230,7 @@ def test_stop_ends_a_hung_program(turning: Studio) -> None:
     program.suspend()
     turning.screen.click(*middle(turning.find(kind="StopButton")["rect"]))
     stands_still(turning)
-    assert not program.is_running()
+    until(lambda: not program.is_running(), "Studio has noticed its end")  # until then it is a zombie
 
 
 def test_robot_stops_when_its_program_is_killed(turning: Studio) -> None:

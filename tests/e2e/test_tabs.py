@@ -14,7 +14,7 @@ from tests.e2e.behaviours import say, started, write
 from tests.e2e.studio import ROOT, Studio
 from tests.e2e.waiting import until
 
-pytestmark = pytest.mark.timeout(170)
+pytestmark = pytest.mark.timeout(400)
 SHOWN = "document.querySelector('.nepTab:not([hidden])')"
 
 
@@ -35,15 +35,16 @@ def start_once_more(studio: Studio, path: Path) -> int:
         **os.environ, "NEP_STUDIO_HOME": str(studio.home), "NEP_MASTER": studio.master,
         "QT_QPA_PLATFORM": "offscreen", "NEP_GATEWAY": "0",
     }  # fmt: skip
-    done = subprocess.run([sys.executable, "-m", "app", path], cwd=ROOT, env=environ, timeout=60, check=False)
+    command = [sys.executable, "-m", "app", path]
+    done = subprocess.run(command, cwd=ROOT, env=environ, timeout=150, check=False)
     return done.returncode
 
 
 def test_tabs_are_restored_at_the_next_start(start: Callable[..., Studio], tmp_path: Path) -> None:
     files = [write(tmp_path / f"{name}.nepb", started(say(name))) for name in ("One", "Two", "Three")]
     studio = start(str(files[0]), str(files[1]))
-    until(lambda: tabs(studio) == ["One", "Two"], "both files are open", 30)
-    until(lambda: "say Two" in shown(studio), "the second shows", 30)
+    until(lambda: tabs(studio) == ["One", "Two"], "both files are open")
+    until(lambda: "say Two" in shown(studio), "the second shows")
     studio.point(".nepTab:not([hidden]) [data-id=started] > .blocklyPath", dy=30)
     studio.screen.key("Delete")
     until(lambda: tabs(studio) == ["One", "Two, not saved"], "its dot says so")
@@ -66,15 +67,15 @@ def test_tabs_are_restored_at_the_next_start(start: Callable[..., Studio], tmp_p
     assert studio.quit() == 0
 
     again = start()  # shows the last behaviours, not the start page
-    until(lambda: tabs(again) == ["One", "Two, not saved", "Three"], "the tabs are there again", 30)
+    until(lambda: tabs(again) == ["One", "Two, not saved", "Three"], "the tabs are there again")
     assert not again.all("Restore"), "nothing is asked after an end in order"
-    until(lambda: "say Three" in shown(again), "the one that showed", 30)
+    until(lambda: "say Three" in shown(again), "the one that showed")
 
 
 def test_earlier_version_opens_in_its_own_tab(start: Callable[..., Studio], tmp_path: Path) -> None:
     path = write(tmp_path / "Mine.nepb", started(say("Before")))
     studio = start(str(path))
-    until(lambda: "say Before" in shown(studio), "the file is open", 30)
+    until(lambda: "say Before" in shown(studio), "the file is open")
     studio.point(".nepTab:not([hidden]) [data-id=started] > .blocklyPath", dy=30)
     studio.screen.key("Delete")
     until(lambda: tabs(studio) == ["Mine, not saved"], "it is edited")

@@ -47,7 +47,12 @@ def test_first_hour_of_a_teacher_is_completed_by_keyboard(
     fight(studio, film, fingers)
     work_in_tabs(studio, film, fingers)
     with film.step("kill -9"):
-        until(lambda: len(list((studio.home / "journal").glob("*.json"))) >= 3, "all of it is kept")
+        journals = studio.home / "journal"
+        kept = lambda: [each.read_text("utf-8") for each in journals.glob("*.json")]  # noqa: E731
+        until(lambda: len(kept()) >= 3, "all of it is kept")
+        until(lambda: "".join(kept()).count('"robot_pepper_do_turn"') == 2, "with the last edit")
+        tabs_file = studio.home / "settings.json"
+        until(lambda: '"Quiz"' in "".join([*kept(), tabs_file.read_text("utf-8")]), "and the new name")
     studio.kill()
     again = start(HOME=str(home))
     again.screen = studio.screen
@@ -118,7 +123,7 @@ def first_steps(studio: Studio, film: Film, fingers: Fingers) -> None:
         fingers.do("first steps", "First steps")
         studio.find("Use the virtual robot", focus=True, **{"in": "first_steps"})
         fingers.press("Return")
-        studio.says("Pepper ready", 40)
+        studio.says("Pepper ready")
         studio.find("Show me", focus=True)
     with film.step("Show me, Ctrl+B, Right: the block that comes first"):
         fingers.press("Return")
@@ -215,13 +220,13 @@ def count(studio: Studio, film: Film, fingers: Fingers) -> None:
         for number in ("1", "2"):
             fingers.press(" ")
             until(lambda number=number: value_of(studio, "touches") == number, "it counts")
-        assert "apple" in value_of(studio, "words")
+        until(lambda: "apple" in value_of(studio, "words"), "the list has them, too")
 
 
 def two_robots(studio: Studio, film: Film, fingers: Fingers, ears: Ears) -> None:
     with film.step("A second robot in the same room"):
         fingers.do("virtual turtle", "Use the virtual Turtle")
-        studio.says("2 robots", 40)
+        studio.says("2 robots")
     with film.step("Pepper broadcasts “start quiz”, Turtle drives when it receives that"):
         fingers.to_canvas()
         fingers.go_to(kind_of(studio, "lists_add")[0])

@@ -94,7 +94,7 @@ def test_first_hour_of_a_teacher_is_completed_by_mouse(hour: Hour, start: Callab
 
 def run(hour: Hour) -> None:
     hour.studio.click("Run", kind="RunButton")
-    until(lambda: hour.studio.outlined("running"), "a block glows", 40)
+    until(lambda: hour.studio.outlined("running"), "a block glows")
 
 
 def stop(hour: Hour) -> None:
@@ -117,7 +117,7 @@ def move_the_robot(hour: Hour) -> str:
     with film.step("One click: a robot, and an empty page that says the first step"):
         studio.click("Use the virtual robot")
         until(lambda: "Drag “when started” here" in str(studio.page("document.body.innerText")), "it says")
-        studio.says("Pepper ready", 40)
+        studio.says("Pepper ready")
     with film.step("“when started” is dragged onto the page"):
         hat = hand.put("Events", "events_started", 60, 40)
     with film.step("“turn” is dragged below it"):
@@ -126,7 +126,7 @@ def move_the_robot(hour: Hour) -> str:
         before = hour.room.state("Pepper")["theta_deg"]
     with film.step("Run: the robot moves after four clicks and two drags"):
         studio.click("Run", kind="RunButton")
-        until(lambda: abs(hour.room.state("Pepper")["theta_deg"] - before) > 2, "the robot turns", 40)
+        until(lambda: abs(hour.room.state("Pepper")["theta_deg"] - before) > 2, "the robot turns")
         assert mouse.clicks <= MAX_CLICKS, mouse.clicks
         assert mouse.drags <= MAX_DRAGS, mouse.drags
     return turn
@@ -209,7 +209,7 @@ def broadcast(hour: Hour, above: str) -> None:
     studio, film, hand = hour.studio, hour.film, hour.hand
     with film.step("A second robot comes into the same room"):
         studio.choose("Robots", "Use the virtual Turtle")
-        studio.says("2 robots", 40)
+        studio.says("2 robots")
         before = until(lambda: hour.room.state("Turtle"), "the Turtle tells how it is")
     with film.step("A broadcast, with a name of its own that is suggested"):
         sends = hand.below(above, "Events", "events_broadcast")

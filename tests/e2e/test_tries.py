@@ -13,8 +13,15 @@ from tests.e2e.film import Film
 from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
 
-pytestmark = pytest.mark.timeout(240)
+pytestmark = pytest.mark.timeout(400)
 CLOSED = "[...document.querySelectorAll('.blocklyFlyout')].every(e => e.style.display === 'none')"
+WATCH = """(() => {
+    window.nepHasGlowed = false;
+    new MutationObserver(() => {
+        window.nepHasGlowed ||= !!document.querySelector('.blocklyFlyout .nepState-running');
+    }).observe(document.body, {subtree: true, childList: true});
+})()"""
+"""JavaScript that records whether a block of the toolbox glows, which may be shorter than two looks."""
 ANSWER = "(e => e && !e.hidden && e.textContent)(document.querySelector('.nepTryAnswer'))"
 
 
@@ -25,15 +32,14 @@ def test_blocks_can_be_tried_from_the_toolbox_and_from_a_selected_block_on(
     path = write(tmp_path / "Tries.nepb", started(say("First", {**turn(180), "id": "turn"})))
     studio = start(str(path), "--theme", theme)
     film = Film(studio, f"tries-{theme}", tmp_path)
-    studio.choose("Robots", "Use the virtual Pepper")
-    studio.says("Pepper ready", 40)
-    studio.spot("[data-id=turn]")
+    studio.use_virtual_pepper("turn")
     before = studio.blocks()
     with film.step("A click on a block of the toolbox lets the robot do it"):
         studio.open_category("Movement")
+        studio.page(WATCH)
         studio.point(".blocklyFlyout .robot_pepper_do_turn > .blocklyPath", dx=10, dy=10)
         studio.says("Trying “turn”")
-        until(lambda: studio.page("!!document.querySelector('.blocklyFlyout .nepState-running')"), "it glows")
+        until(lambda: studio.page("window.nepHasGlowed"), "it has glowed")
     studio.says("Tried “turn”")
     assert studio.blocks() == before, "nothing is added to the program"
     with film.step("A click on a sensor shows its value"):

@@ -11,10 +11,10 @@ import pytest
 import nep
 from app.core.storage.settings import Settings
 from tests.e2e.behaviours import forever, started, turn, write
-from tests.e2e.studio import Studio
+from tests.e2e.studio import END_S, Studio
 from tests.e2e.waiting import until
 
-pytestmark = pytest.mark.timeout(240)
+pytestmark = pytest.mark.timeout(400)
 
 
 def robots(studio: Studio) -> list[int]:
@@ -26,22 +26,20 @@ def test_two_studios_share_a_robot_and_the_second_survives_the_first(
     start: Callable[..., Studio], tmp_path: Path, same_home: bool
 ) -> None:
     first = start(str(write(tmp_path / "Turning.nepb", started(forever(turn(300))))))
-    first.choose("Robots", "Use the virtual Pepper")
-    first.says("Pepper ready", 40)
-    first.spot("[data-id=turn]")
+    first.use_virtual_pepper("turn")
     first.click("Run", kind="RunButton")
     until(lambda: "turn" in first.outlined("running"), "the block glows")
 
     environment = {} if same_home else {"NEP_STUDIO_HOME": str(tmp_path / "other")}
     second = start("--new-window", **environment)
-    second.says("Pepper ready", 40)
-    assert len(second.children("nep", "master")) == 1
+    second.says("Pepper ready")
+    until(lambda: len(second.children("nep", "master")) == 1, "there is one master")
     second.choose("Robots", "Use the virtual Pepper")
     second.says("Pepper is connected")  # loading the blocks closes open menus
     second.choose("View", "Developer layout")
     second.find("Topics")
     second.screen.key("F12")
-    until(lambda: not first.programs(), "the first Studio's program has ended", 10)
+    until(lambda: not first.programs(), "the first Studio's program has ended")
     with nep.node("listener", master=first.master) as node:
         states = node.new_sub("/Pepper/state", "json")
         heard = [states.receive(30.0).payload for _ in range(3)]
@@ -52,19 +50,19 @@ def test_two_studios_share_a_robot_and_the_second_survives_the_first(
     second.pick("Dark")
     (firsts,) = robots(first)
     first.process.terminate()
-    assert first.process.wait(10) == 0
+    assert first.process.wait(END_S) == 0
     until(lambda: firsts not in robots(second), "the first one's robot has ended with it")
     # At once: the second Studio may not have noticed the exit and may still show “Pepper ready”.
     second.choose("Robots", "Use the virtual Pepper")
-    until(lambda: robots(second), "another robot comes", 40)
-    second.says("Pepper ready", 40)
+    until(lambda: robots(second), "another robot comes")
+    second.says("Pepper ready")
     with nep.node("listener", master=second.master) as node:
-        assert node.new_sub("/Pepper/state", "json").receive(20.0).payload["moving"] is False
+        assert node.new_sub("/Pepper/state", "json").receive(60.0).payload["moving"] is False
     assert len(robots(second)) == 1
     assert len(second.children("nep", "master")) == 1
     second.process.terminate()
-    assert second.process.wait(10) == 0
-    until(lambda: not second.children("nep", "master"), "the master ends with the last Studio", 20)
+    assert second.process.wait(END_S) == 0
+    until(lambda: not second.children("nep", "master"), "the master ends with the last Studio")
     homes = [first.home, second.home if same_home else tmp_path / "other"]
     assert Settings(homes[1]).theme == "dark"
     for home in homes:

@@ -14,21 +14,21 @@ from app.ui.robot_drawing.state import RoomBounds
 from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
 
-pytestmark = pytest.mark.timeout(240)
+pytestmark = pytest.mark.timeout(400)
 
 
 def test_virtual_robots_are_restored_at_startup_until_removed(start: Callable[..., Studio]) -> None:
     studio = start()
     studio.click("Use the virtual robot")
-    studio.says("Pepper ready", 40)
+    studio.says("Pepper ready")
     assert studio.quit() == 0
 
     again = start()
-    again.says("Pepper ready", 40)
+    again.says("Pepper ready")
     again.kill()
 
     third = start()
-    third.says("Pepper ready", 40)
+    third.says("Pepper ready")
     third.choose("Robots", "Remove virtual robots")
     until(lambda: not third.children("app.robots.simulated"), "its program has ended")
     assert third.quit() == 0
@@ -67,7 +67,7 @@ class RoomOnScreen:
 
         ``up`` is the height in drawing units, multiplied by the scale of objects at this position.
         """
-        x, y, wide, high = self.studio.find(kind="RoomView")["rect"]
+        x, y, wide, high = self.studio.still(kind="RoomView")["rect"]
         bounds = RoomBounds(-2.5, 3.0, -2.5, 2.5)
         stage = Stage(QRectF(x, y, wide, high), bounds)
         spot = stage.spot_at(*place)
@@ -85,9 +85,9 @@ class RoomOnScreen:
 
 def test_two_robots_share_a_room_that_the_user_edits(studio: Studio, address: str) -> None:
     studio.click("Use the virtual robot")
-    studio.says("Pepper ready", 40)
+    studio.says("Pepper ready")
     studio.choose("Robots", "Use the virtual Turtle")
-    studio.says("2 robots", 40)
+    studio.says("2 robots")
     with nep.node("watcher", master=address) as node:
         room = RoomOnScreen(studio, node)
         until(lambda: room.state("Pepper") and room.state("Turtle"), "both robots live")
@@ -109,13 +109,14 @@ def test_two_robots_share_a_room_that_the_user_edits(studio: Studio, address: st
 
         heard = node.new_sub("/Pepper/heard", "json")
         studio.click("Say something to Pepper")
+        studio.find("Say something to Pepper", focus=True)
         studio.screen.type("hello there")
         studio.screen.key("Return")
         until(
             lambda: (message := heard.receive(0.0)) and message.payload == {"word": "hello there"}, "it hears"
         )
 
-        small = studio.find(kind="RoomView")["rect"]
+        small = studio.still(kind="RoomView")["rect"]
         x, y, _wide, _high = small
         studio.screen.double_click(x + 6, y + 6)
         until(lambda: studio.find(kind="RoomView")["rect"][2] > small[2] * 2, "a double click makes it large")
