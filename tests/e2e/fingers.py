@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from tests.e2e.person import Person
 from tests.e2e.teacher_session import CANVAS, kind_of
 from tests.e2e.waiting import until
+from tests.still import KEYS_SEEN
 
 PACE_S = 0.08  # the page moves its focus in the next frame, not with the key press
 MANY = 40
@@ -16,16 +17,6 @@ FOCUSED = (
     "(it => [it.getAttribute('class') ?? '', it.getAttribute('aria-label') ?? '', it.id]"
     ".join(' | '))(document.activeElement)"
 )
-KEYS_SEEN = """(() => {
-    if (window.nepKeysSeen === undefined) {
-        window.nepKeysSeen = 0;
-        const isModifier = ({key}) => ['Control', 'Shift', 'Alt', 'Meta'].includes(key);
-        const seen = (frames) => frames ? requestAnimationFrame(() => seen(frames - 1)) : ++nepKeysSeen;
-        window.addEventListener('keydown', (event) => isModifier(event) || seen(3), true);
-    }
-    return window.nepKeysSeen;
-})()"""
-"""JavaScript for the number of keys, without modifiers, whose results the page has rendered."""
 DRAGGING = "!!document.querySelector('.blocklyDragging')"
 FIELD = "Find a command, panel, topic, robot or file"
 

@@ -15,7 +15,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 from app import resources
 from app.blocks.model.workspace_json import WorkspaceJson
 from app.ui.blockly.view import BlocklyView
-from tests.still import LOOK
+from tests.still import KEYS_SEEN, LOOK
 
 DATA = Path(__file__).resolve().parents[1] / "data" / "blockly"
 DEFINITIONS = json.loads((DATA / "definitions.json").read_text("utf-8"))
@@ -23,7 +23,7 @@ PICTURE = json.loads((DATA / "picture.json").read_text("utf-8"))
 UNKNOWN = json.loads((DATA / "unknown.json").read_text("utf-8"))
 TOKENS = json.loads(resources.path("theme", "tokens.json").read_text("utf-8"))
 START = {"type": "events_started", "id": "start", "x": 56, "y": 56}
-WAIT_MS = 30_000
+WAIT_MS = 60_000
 PAINTED = "performance.getEntriesByName('first-contentful-paint').length > 0"
 LISTEN = """
 window.nepEvents = [];
@@ -159,6 +159,20 @@ class Person:
 
     def press(self, key: Qt.Key, modifiers=Qt.NoModifier) -> None:
         QTest.keyClick(self.target, key, modifiers)
+
+    def press_and_see(self, key: Qt.Key, modifiers=Qt.NoModifier) -> None:
+        """Press a key in the page and wait until its result is rendered."""
+        before = self.ask(KEYS_SEEN)
+        self.press(key, modifiers)
+        self.wait_for(f"{KEYS_SEEN} > {before}")
+
+    def render(self) -> None:
+        """Wait until the page has rendered three frames; positions and focus follow in the next one."""
+        self.ask(
+            "(frame => { window.nepRendered = false; frame(() => frame(() => frame("
+            "() => window.nepRendered = true))); })(then => requestAnimationFrame(then))"
+        )
+        self.wait_for("window.nepRendered")
 
     def wheel(self, by: int) -> None:
         """Turn the wheel over the middle of the canvas; a negative value scrolls down.

@@ -33,7 +33,7 @@ if hasattr(os, "geteuid") and os.geteuid() == 0:
 # Required by Qt before the application is created if a web view is created later.
 QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
 
-WAIT_MS = 30_000
+WAIT_MS = 60_000
 """Default timeout in milliseconds; the 5 s of pytest-qt are too short on a busy computer."""
 
 BAD = {QtMsgType.QtWarningMsg, QtMsgType.QtCriticalMsg, QtMsgType.QtFatalMsg}

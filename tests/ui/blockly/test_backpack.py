@@ -111,10 +111,10 @@ def test_stack_dropped_on_the_backpack_is_stored_and_stays_on_the_canvas(qtbot, 
     put_in(them, window, "one")
     assert window.types == [["wait", "wait"]]
     assert window.said == ["Added 2 blocks to the backpack"]
-    assert them.newest() == before
+    them.until(lambda: them.newest() == before, "it is where it was")
     assert edits == []
     them.wait_for("document.querySelector('.nepBackpack').title", "Backpack (1)")
-    assert not them.ask("document.querySelector('.nepBackpack').classList.contains('nepOver')")
+    them.wait_for("document.querySelector('.nepBackpack').classList.contains('nepOver')", False)
     assert "id" not in window.backpack.items[0].block
     window.undo[0]()
     them.wait_for("document.querySelector('.nepBackpack').classList.contains('nepFull')", False)
@@ -299,4 +299,4 @@ def test_blocks_of_a_mixed_selection_are_stored_without_notes_and_the_user_is_no
     assert window.said == [
         "Added 1 block to the backpack. Notes weren't added: the backpack can only hold blocks."
     ]
-    assert them.newest() == before
+    them.until(lambda: them.newest() == before, "all is where it was")

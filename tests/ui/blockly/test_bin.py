@@ -63,13 +63,13 @@ def test_block_dragged_over_the_toolbox_shows_the_bin_and_is_deleted_with_undo_o
     them.move(QPoint(500, 300), TOOLBOX)
     them.wait_for(HINT)
     assert "Drop here to delete" in them.ask("document.querySelector('.nepDropHere').textContent")
-    assert them.ask("getComputedStyle(document.querySelector('.blocklyDragging')).opacity") == "0.5"
+    them.wait_for("getComputedStyle(document.querySelector('.blocklyDragging')).opacity", "0.5")
     them.move(TOOLBOX, QPoint(500, 300))
     them.wait_for(HINT, False)
     them.move(QPoint(500, 300), TOOLBOX)
     them.drop(TOOLBOX)
     qtbot.waitUntil(lambda: told == [2], timeout=WAIT_MS)
-    assert them.ask(HINT) is False
+    them.wait_for(HINT, False)
     assert ids(them) == ["start"]
     view.undo_deletion()
     qtbot.waitUntil(lambda: ids(them) == ["one", "start"], timeout=WAIT_MS)
@@ -110,7 +110,7 @@ def test_block_dropped_on_the_bin_is_deleted_and_the_bin_lists_the_newest_first(
     assert them.ask(HINT) is False
     them.drop(bin_)
     qtbot.waitUntil(lambda: told == [1, 2], timeout=WAIT_MS)
-    assert them.ask("document.querySelector('.nepBin').title") == "Deleted blocks (2)"
+    them.wait_for("document.querySelector('.nepBin').title", "Deleted blocks (2)")
     open_bin(them)
     them.wait_for(IN_BIN, ["one", "start"])
 
@@ -213,6 +213,6 @@ def test_bin_holds_at_most_fifty_deletions_and_each_behaviour_has_its_own_bin(qt
         them.wait_for(f"document.activeElement.closest('[data-id=s{number}]') !== null")
         them.press(Qt.Key_Delete)
         them.wait_for(f"!document.querySelector('[data-id=s{number}]')")
-    assert them.ask("document.querySelector('.nepBin').title") == "Deleted blocks (50)"
+    them.wait_for("document.querySelector('.nepBin').title", "Deleted blocks (50)")
     view.show_tab("other", workspace(START))
     them.wait_for("document.querySelector('.nepBin').title", "Deleted blocks")

@@ -122,10 +122,10 @@ def test_block_dropped_outside_the_page_returns_to_its_position_without_an_edit(
     carry(them, told, TWO, to)
     qtbot.waitUntil(lambda: bool(told.dropped), timeout=WAIT_MS)
     assert told.dropped == [view.mapToGlobal(to)]
-    assert told.places[-1] is None, "the ring goes"
-    assert them.newest() == before
+    them.until(lambda: told.places[-1] is None, "the ring goes")
+    them.until(lambda: them.newest() == before, "it is where it was")
     assert (changes, told.deleted) == ([], [])
-    assert them.ask("document.querySelector('.nepDropHere').hidden") is True
+    them.wait_for("document.querySelector('.nepDropHere').hidden")
 
 
 def test_window_is_notified_while_a_drag_is_outside_the_page(qtbot, view, them, told) -> None:
@@ -145,7 +145,7 @@ def test_stack_moved_to_another_tab_is_one_undo_step_in_each_tab(qtbot, view, th
     bring(qtbot, view, told)
     assert told.brought == [(2, "moved")]
     assert chains(them) == [["started"], ["wait", "wait"]]
-    assert len(them.ask(f"[...{SHOWN}.querySelectorAll('.blocklySelected')].map(e => 1)")) == 1
+    them.wait_for(f"{SHOWN}.querySelectorAll('.blocklySelected').length", 1)
     view.undo()
     qtbot.waitUntil(lambda: chains(them) == [["started"]], timeout=WAIT_MS)
     view.show_tab("a", {})
@@ -183,7 +183,7 @@ def test_multi_selection_is_moved_together_or_not_at_all(qtbot, view, them, told
     them.wait_for("document.querySelectorAll('.nepTab:not([hidden]) .nepChosen').length", 2)
     carry(them, told, path.format("one"), ABOVE)
     qtbot.waitUntil(lambda: bool(told.dropped), timeout=WAIT_MS)
-    assert them.newest() == before
+    them.until(lambda: them.newest() == before, "they are where they were")
     bring(qtbot, view, told)
     assert told.brought == [(2, "moved")]
     assert chains(them) == [["started"], ["wait"], ["wait"]]
@@ -330,7 +330,7 @@ def test_drag_released_outside_or_cancelled_in_another_tab_restores_the_block(
         QTest.mouseRelease(
             them.target, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, QPoint(600, 300)
         )
-    assert them.newest() == there
+    them.until(lambda: them.newest() == there, "the other tab is as before")
     view.show_tab("a", {})
     them.until(lambda: chains(them) == BEFORE, "it is where it was")
     assert them.newest() == before

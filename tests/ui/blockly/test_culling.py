@@ -33,7 +33,7 @@ def test_script_is_rendered_when_scrolled_into_the_viewport(person):
     them.wait_for(drawn("here", "below", "right"), ["here"])
     them.view.show_block("below_wait")
     them.wait_for(drawn("here", "below", "below_wait", "right"), ["below", "below_wait"])
-    assert them.ask(FOCUSED) == "below_wait"
+    them.wait_for(FOCUSED, "below_wait")
     them.view.zoom_to_fit()
     them.wait_for(drawn("here", "below", "right"), ["here", "below", "right"])
     assert [each["id"] for each in them.tops()] == ["here", "below", "right"]
@@ -56,7 +56,7 @@ def test_script_with_a_note_is_always_rendered(person):
     below["icons"] = {"comment": {"text": "look", "pinned": True, "height": 80, "width": 160}}
     them = person(script("here", 40, 40), below)
     them.wait_for("document.querySelectorAll('.blocklyBubble').length", 1)
-    assert them.ask(drawn("here", "below")) == ["here", "below"]
+    them.wait_for(drawn("here", "below"), ["here", "below"])
 
 
 def test_culling_preserves_the_stacking_order(person):

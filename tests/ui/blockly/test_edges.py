@@ -47,7 +47,7 @@ VALUES = at(compare("whole", compare("part", {"type": "values_number", "id": "nu
 
 def test_block_nested_in_a_block_of_the_same_colour_has_an_outline(person) -> None:
     them = person(LOOPS, VALUES, at(repeat("other", SAY), 420, 200))
-    assert them.ask(INSIDE) == ["beside", "deep", "deeper", "inner", "number", "part"]
+    them.wait_for(INSIDE, ["beside", "deep", "deeper", "inner", "number", "part"])
 
 
 def test_outlines_follow_a_moved_script(qtbot, view, person) -> None:
@@ -123,7 +123,7 @@ def test_focus_ring_is_hidden_after_a_click_and_shown_by_the_first_navigation_ke
         them.click(place, dx=9, dy=9)
         them.wait_for(keys, False)
         assert rings(them) == [], place
-        assert them.ask(f"{shown}.classList.contains('blocklyKeyboardNavigation')") is False
+        them.wait_for(f"{shown}.classList.contains('blocklyKeyboardNavigation')", False)
     them.wait_for(SELECTED, ["start"])  # a clicked block is still shown as selected
     them.press(Qt.Key_Down)
     them.wait_for(keys)

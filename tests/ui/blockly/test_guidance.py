@@ -46,8 +46,8 @@ def middle_of(person: Person, selector: str) -> QPoint:
 def test_empty_canvas_shows_the_first_step_and_offers_a_robot_until_a_robot_connects(
     empty: Person, view: BlocklyView
 ) -> None:
-    assert empty.ask(SAID) == "Drag “when started” here"
-    assert empty.ask(BUTTONS) == ["Use the virtual robot", "Show me", "Open an example"]
+    empty.wait_for(SAID, "Drag “when started” here")
+    empty.wait_for(BUTTONS, ["Use the virtual robot", "Show me", "Open an example"])
     asked = received(view, CanvasButtonPressed, "button")
     empty.click(".nepBegin button:nth-child(1)", dx=20)
     empty.click(".nepBegin button:nth-child(3)", dx=20)
@@ -78,6 +78,8 @@ def test_block_dropped_on_the_empty_canvas_hides_the_hint(empty: Person) -> None
     empty.wait_for(SHOWN, False)
     (block,) = empty.tops()
     assert block["type"] == "events_started"
+    empty.wait_for("!!document.querySelector('.blocklySelected')")  # the keys go to it
+    empty.render()
     empty.press(Qt.Key.Key_Delete)
     empty.wait_for(SHOWN)
     assert empty.tops() == []

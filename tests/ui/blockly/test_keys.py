@@ -61,15 +61,15 @@ def begin_to_search(them: Person) -> None:
 
 
 def press(them: Person, *keys: Qt.Key) -> None:
-    """Press keys with pauses, because the page moves the focus with the next frame."""
+    """Press keys one after the other, because the page moves the focus with the next frame."""
     for key in keys:
-        them.press(key)
+        them.press_and_see(key)
         QTest.qWait(PACE_MS)
 
 
 def hold(them: Person, key: Qt.Key, held=Qt.ControlModifier) -> None:
     """Press a key with Ctrl or other modifiers."""
-    them.press(key, held)
+    them.press_and_see(key, held)
     QTest.qWait(PACE_MS)
 
 
@@ -101,7 +101,7 @@ def test_behaviour_is_built_with_the_keyboard_only(qtbot, view, person):
     press(them, Qt.Key_Return)  # below the event block, which had the focus
     qtbot.waitUntil(lambda: "next" in them.tops()[0], timeout=WAIT_MS)
     them.wait_for("!document.querySelector('.blocklyDragging')")
-    QTest.qWait(PACE_MS)
+    them.render()
     press(them, Qt.Key_Right)
     goes_to(them, "Edit number: 2")
     press(them, Qt.Key_Return)
@@ -129,8 +129,8 @@ def test_robot_block_is_found_by_search_and_inserted_at_the_focus(qtbot, view, t
     qtbot.waitUntil(lambda: "next" in them.tops()[0], timeout=WAIT_MS)
     assert them.tops()[0]["next"]["block"]["type"] == "robot_pepper_do_say"
     them.wait_for("!document.querySelector('.blocklyDragging')")
-    QTest.qWait(PACE_MS)
-    assert them.ask("document.querySelector('.nepSearch input').value") == ""
+    them.render()
+    them.wait_for("document.querySelector('.nepSearch input').value", "")
     press(them, Qt.Key_Right)
     goes_to(them, "Pepper")
 
@@ -182,7 +182,7 @@ def test_find_in_workspace_wraps_around_and_focuses_the_match_on_close(view, the
     them.wait_for(now, ["start"])
     press(them, Qt.Key_Escape)
     goes_to(them, "when started")
-    assert them.ask("document.querySelectorAll('.nepFound').length") == 0
+    them.wait_for("document.querySelectorAll('.nepFound').length", 0)
     press(them, Qt.Key_Down)
     goes_to(them, "wait")
 
@@ -202,19 +202,19 @@ def test_f1_explains_the_focused_block_and_otherwise_reaches_the_window(qtbot, v
     take_the_keys(them)
     press(them, Qt.Key_Tab)
     goes_to(them, "events")
-    press(them, Qt.Key_F1)
+    them.press(Qt.Key_F1)
     qtbot.waitUntil(lambda: pressed == ["window"], timeout=WAIT_MS)
     to_the_canvas(them)
     press(them, Qt.Key_Down, Qt.Key_Down)
     goes_to(them, "wait")
     qtbot.waitUntil(lambda: view._is_block_focused, timeout=WAIT_MS)
-    press(them, Qt.Key_F1)
+    them.press(Qt.Key_F1)
     them.wait_for(f"({CARD}).includes('Waits this number of seconds')")
     goes_to(them, "Close help")
     assert "secondsa number; 2 by default" in them.ask(CARD)
     press(them, Qt.Key_Escape)
     goes_to(them, "wait")
-    assert them.ask(CARD) == ""
+    them.wait_for(CARD, "")
     assert pressed == ["window"]
     view.setParent(None)  # the test owns the view, not the window
 

@@ -94,7 +94,7 @@ def test_block_is_moved_and_dropped_with_the_keyboard(qtbot, them):
         them.press(Qt.Key_Right, Qt.ControlModifier)
     them.press(Qt.Key_Return)
     them.wait_for("!document.querySelector('.blocklyDragging')")
-    assert not them.ask("!!document.querySelector('.blocklyToast')"), "it is said no longer than it moves"
+    them.wait_for("!!document.querySelector('.blocklyToast')", False)  # it is said no longer than it moves
     qtbot.waitUntil(lambda: len(them.tops()) == 2, timeout=WAIT_MS)
 
 
@@ -122,8 +122,8 @@ def test_repeated_delete_removes_only_the_selected_block(qtbot, them):
 
 def test_focus_moves_to_the_connection_of_the_deleted_block(qtbot, them):
     on_a_block(them)
-    them.press(Qt.Key_Up)
-    them.press(Qt.Key_Down)
+    them.press_and_see(Qt.Key_Up)
+    them.press_and_see(Qt.Key_Down)
     them.wait_for("document.activeElement.closest('[data-id]')?.dataset.id", "w")
     them.press(Qt.Key_Delete)
     them.wait_for("document.activeElement.classList.contains('blocklyHighlightedConnectionPath')")

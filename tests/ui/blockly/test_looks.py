@@ -27,9 +27,7 @@ def test_theme_change_keeps_blocks_and_undo_stack(qtbot, view, person):
     view.undo()
     qtbot.waitUntil(lambda: them.tops() == [START], timeout=WAIT_MS)
     primary = TOKENS["block"]["events"]["dark"]["tertiary"].lower()
-    assert (
-        them.ask("document.querySelector('[data-id=start] > .blocklyPath').getAttribute('stroke')") == primary
-    )
+    them.wait_for("document.querySelector('[data-id=start] > .blocklyPath').getAttribute('stroke')", primary)
 
 
 def test_flat_theme_tokens_are_supported(view, person):
@@ -54,7 +52,7 @@ def test_running_and_stopped_blocks_are_outlined(view, person):
     assert them.ask(shape.format(".nepState .nepOutline")) == them.ask(shape.format(".blocklyPath"))
     animated = "getComputedStyle(document.querySelector('.nepGlow')).animationName"
     them.wait_for("!!document.querySelector('.nepGlow')")  # a block that ends immediately gets no glow
-    assert them.ask(animated) == "nepBreathe"
+    them.wait_for(animated, "nepBreathe")
     view.set_reduced_motion(True)
     them.wait_for(animated, "none")
     view.highlight([])
@@ -69,9 +67,11 @@ def test_layout_stays_fast_after_300_highlights(qtbot, view, person):
     for number in range(300):
         view.highlight([ids[number % 3]])
     them.wait_for(outlined("running"), ["wave"])
+    # The fastest of five layouts: another program may interrupt each of them.
     script = (
-        "(() => { const begin = performance.now();"
-        "document.body.getBoundingClientRect(); return performance.now() - begin; })()"
+        "Math.min(...[1, 2, 3, 4, 5].map(width => { document.body.style.paddingRight = `${width}px`;"
+        "const begin = performance.now();"
+        "document.body.getBoundingClientRect(); return performance.now() - begin; }))"
     )
     assert them.ask(script) < 100
 
@@ -137,7 +137,7 @@ def test_find_bar_fits_next_to_the_toolbox_with_large_text(view, person, percent
         "document.querySelector('.nepFind').getBoundingClientRect().left -"
         " document.querySelector('.nepTab:not([hidden]) .blocklyToolbox').getBoundingClientRect().right"
     )
-    assert them.ask(beside) >= 0
+    them.wait_for(f"{beside} >= 0")
 
 
 def test_blocks_of_absent_robots_are_grey(view, person):
@@ -245,10 +245,12 @@ def test_stale_live_values_are_faint_and_changing_digits_do_not_change_the_block
     live = "document.querySelector('.blocklyBlockCanvas .nepLive')"
     them.wait_for(f"{live}.textContent.replaceAll('\\u00a0', ' ')", "84 %")
     path = f"{live}.closest('.blocklyBlock').querySelector('.blocklyPath').getAttribute('d')"
+    them.render()  # the width of a block follows its text
     before = them.ask(path)
     view.set_live_values({"Pepper/battery": "79 %"}, ["Pepper/battery"])
     them.wait_for(f"{live}.textContent.replaceAll('\\u00a0', ' ')", "79 %")
-    assert them.ask(f"{live}.classList.contains('nepOld')") is True
+    them.wait_for(f"{live}.classList.contains('nepOld')")
+    them.render()
     assert them.ask(path) == before
     view.set_live_values({"Pepper/battery": "100 %"})
     them.wait_for(f"{path} != {before!r} && !{live}.classList.contains('nepOld')")

@@ -74,6 +74,9 @@ def drag(them: Person, selector: str, inside: QPoint, way: QPoint) -> None:
 def one_step(qtbot, them: Person, told: list[dict], which: str, before: dict) -> Note:
     """Wait for the reported change of a note, undo and redo it; return the changed note."""
     qtbot.waitUntil(lambda: told and WHICH[which](told[-1]) != WHICH[which](before), timeout=WAIT_MS)
+    them.wait_for("!document.querySelector('.blocklyDragging')")
+    them.render()  # what was dropped snaps to the grid
+    qtbot.waitUntil(lambda: told[-1] == them.newest(), timeout=WAIT_MS)
     changed = WHICH[which](told[-1])
     them.view.undo()
     qtbot.waitUntil(lambda: told[-1] == before, timeout=WAIT_MS)

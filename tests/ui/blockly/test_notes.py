@@ -201,6 +201,7 @@ def test_scripts_and_notes_of_translated_examples_do_not_overlap(qtbot, language
         first = state["blocks"]["blocks"][0]["id"]
         them.wait_for(f"!!document.querySelector('.nepTab:not([hidden]) [data-id={json.dumps(first)}]')")
         them.wait_for(f"{NOTES}.length", 1)
+        them.render()  # blocks get their size, and scripts their position, in the next frame
         scripts = [
             them.ask(f"[...{SCRIPTS}[{number}].querySelectorAll('.blocklyPath')].map(e => {BOX})")
             for number in range(len(state["blocks"]["blocks"]))

@@ -99,7 +99,7 @@ def test_selection_button_makes_the_next_drag_draw_one_rubber_band(them):
     them.click(".nepFrameButton")
     frame(them, "d", "e", Qt.NoModifier)
     them.wait_for(CHOSEN, ["d", "e"])
-    assert them.ask("document.querySelector('.nepFrameButton').getAttribute('aria-pressed')") == "false"
+    them.wait_for("document.querySelector('.nepFrameButton').getAttribute('aria-pressed')", "false")
 
 
 @pytest.mark.parametrize("key", [Qt.ControlModifier, Qt.ShiftModifier])

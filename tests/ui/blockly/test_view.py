@@ -149,6 +149,8 @@ def test_killed_web_process_loses_no_edits(qtbot, view, person, caplog):
     them.open_category("Control")
     with qtbot.waitSignal(view.changed, timeout=WAIT_MS):
         them.drag(".blocklyFlyout .control_wait", QPoint(700, 400))
+    them.wait_for("!document.querySelector('.blocklyDragging')")
+    them.render()  # the dropped block snaps to the grid
     before = them.newest()
     view.set_theme(TOKENS, is_dark=True)
     view.highlight(["start"])
@@ -160,7 +162,7 @@ def test_killed_web_process_loses_no_edits(qtbot, view, person, caplog):
     assert them.newest() == before
     them.wait_for(outlined("running"), ["start"])
     dark = QColor(TOKENS["colour"]["dark"]["workspace"]).getRgb()[:3]
-    assert them.ask("getComputedStyle(document.body).backgroundColor") == "rgb({}, {}, {})".format(*dark)
+    them.wait_for("getComputedStyle(document.body).backgroundColor", "rgb({}, {}, {})".format(*dark))
     with qtbot.waitSignal(view.key_pressed, timeout=WAIT_MS):
         them.press(Qt.Key_F12)
     assert "ended" in caplog.text

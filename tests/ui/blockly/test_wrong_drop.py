@@ -112,9 +112,13 @@ def test_drop_on_empty_canvas_shows_no_message(qtbot, them):
 
 @pytest.mark.parametrize("zooms", [-4, 0, 3])
 def test_block_snaps_from_the_same_screen_distance_at_every_zoom(qtbot, view, them, zooms):
-    for _ in range(abs(zooms)):
+    width = "document.querySelector('[data-id=start] > .blocklyPath').getBoundingClientRect().width"
+    for _ in range(abs(zooms)):  # the page receives each step separately
+        before = them.ask(width)
         (view.zoom_in if zooms > 0 else view.zoom_out)()
+        them.wait_for(f"{width} !== {before}")
     view.show_block("turn")
+    them.wait_for("document.activeElement.closest('[data-id]')?.dataset.id", "turn")
     end = corner(them, "[data-id=start] > .blocklyPath", "bottom")
     drop(them, "turn", end + QPoint(NEAR, 0))
     qtbot.waitUntil(lambda: nested(them, "start") == "robot_pepper_do_turn", timeout=WAIT_MS)
