@@ -21,7 +21,7 @@ from threading import Lock
 
 import psutil
 
-_TIMEOUT_S = 20.0
+_TIMEOUT_S = 60.0
 _SWITCH = "switch"
 _NET = "10.88.0"
 _FIRST = "mount -t tmpfs tmpfs /dev/shm; ip link set lo up; hostname {name}; echo; exec cat"

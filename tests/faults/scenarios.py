@@ -17,7 +17,7 @@ from tests.nep.programs import eventually
 
 _BEFORE_S = 0.5
 """Seconds of traffic before a fault."""
-_SILENT_S = 8.0
+_SILENT_S = 12.0
 """Seconds in which a dead connection must be closed; the kernel's own timeout is 15 s."""
 RATE = 500
 """Messages per second."""

@@ -57,7 +57,7 @@ def _tell(scenario: scenarios.Scenario, measured: scenarios.Measured) -> None:
     )
 
 
-@pytest.mark.timeout(150)
+@pytest.mark.timeout(400)
 @_each_backend
 def test_every_message_is_received_or_counted_as_lost_under_network_faults(today: Day) -> None:
     with ThreadPoolExecutor(len(scenarios.SIDE_BY_SIDE)) as side_by_side:
@@ -69,7 +69,7 @@ def test_every_message_is_received_or_counted_as_lost_under_network_faults(today
     assert not failures, failures
 
 
-@pytest.mark.timeout(150)
+@pytest.mark.timeout(400)
 @pytest.mark.parametrize("scenario", [scenarios.master_again, scenarios.master_moved])
 def test_failover_to_another_master_loses_no_message(
     today: Day, scenario: scenarios.Scenario, is_long: bool
@@ -77,7 +77,7 @@ def test_failover_to_another_master_loses_no_message(
     _tell(scenario, scenario(today, _OUT_LONG_S if is_long else _OUT_S))
 
 
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(400)
 @_each_backend
 @pytest.mark.usefixtures("_with_long")
 @pytest.mark.parametrize("scenario", [*scenarios.SIDE_BY_SIDE, *scenarios.ALONE])

@@ -35,7 +35,7 @@ JAVASCRIPT = {JAVASCRIPT_PEER: "javascript", ROSLIB_PEER: "roslib"}
 SHARED = "shared"
 """Name of the environment with the packages that all Python peers need."""
 MARK = "\x1e"
-LONG_S = 20.0
+LONG_S = 60.0
 FIRST_S = 600.0
 
 
@@ -302,7 +302,7 @@ def fixed_ports() -> Iterator[None]:
     with one_run_at_a_time():
         for port in FIXED_PORTS:
             with socket.socket() as probe:
-                probe.settimeout(0.5)
+                probe.settimeout(5)
                 if probe.connect_ex(("127.0.0.1", port)) == 0:
                     pytest.fail(
                         f"port {port} is taken by another program; close it and run the interop tests again"

@@ -23,7 +23,7 @@ def node(master):
 def graph_shows(node):
     """Return a function that waits until the graph meets a condition and returns the graph."""
 
-    def wait(wanted, timeout_s=30.0):
+    def wait(wanted, timeout_s=60.0):
         watch = nep.node("watch")
         with watch, watch.new_sub("nothing") as idle:
             for _ in range(int(timeout_s / 0.1)):
@@ -71,9 +71,9 @@ def test_original_is_listed_with_its_rate_and_removed_when_its_process_ends(peer
     assert named(view, view.topics["t"].publishers) == ["sender"]
     assert named(view, view.topics["t"].subscribers) == ["receiver"]
     publisher.kill()
-    graph_shows(lambda view: "sender" not in {each.name for each in view.nodes.values()}, 3.0)
+    graph_shows(lambda view: "sender" not in {each.name for each in view.nodes.values()})
     subscriber.kill()
-    graph_shows(lambda view: "t" not in view.topics, 3.0)
+    graph_shows(lambda view: "t" not in view.topics)
 
 
 def test_originals_exchange_messages_again_after_the_master_is_killed_and_restarted(
@@ -183,7 +183,7 @@ def test_broadcast_on_7777_lists_programs_of_every_kind(peers, master):
     try:
         with context.socket(zmq.SUB) as tool:
             tool.setsockopt(zmq.SUBSCRIBE, b"master")
-            tool.setsockopt(zmq.RCVTIMEO, 20_000)
+            tool.setsockopt(zmq.RCVTIMEO, 60_000)
             tool.connect("tcp://127.0.0.1:7777")
             for at, kind in enumerate(("0.5.3.5", "0.5.4.5", "0.5.4.8", "nep-js")):
                 peers.start(kind, "subscriber", f"t{at}", name=f"n{at}").wait_ready()
@@ -207,7 +207,7 @@ def test_invalid_requests_do_not_affect_a_running_master(peers, master, node):
         for bad in (b"", b"\x00\xff", b"[1]", b'{"node":1}', b"{" * 9000):
             for port in (7000, 50000):
                 with context.socket(zmq.REQ) as asking:
-                    asking.setsockopt(zmq.RCVTIMEO, 5000)
+                    asking.setsockopt(zmq.RCVTIMEO, 60_000)
                     asking.connect(f"tcp://127.0.0.1:{port}")
                     asking.send(bad)
                     assert json.loads(asking.recv())["state"] == "failure"
@@ -230,7 +230,7 @@ def test_topic_pub_command_reaches_an_original(peers, master):
     subscriber = peers.start("0.5.4.8", "subscriber", "t").wait_ready()
     for _ in range(30):
         done = peers.run_native(["-m", "nep", "topic", "pub", "t", '{"by": "hand"}'])
-        done.process.wait(10)
+        done.process.wait(60)
         if subscriber.hears({"by": "hand"}, 0.5):
             return
     pytest.fail(f"not heard {sys.argv}")

@@ -30,6 +30,17 @@ def port() -> int:
         return int(probe.getsockname()[1])
 
 
+def has_no_server(client: nep.Client) -> bool:
+    """Return whether a call finds no server; the first one may only notice that the server has ended."""
+    try:
+        client.call({}, timeout_s=0.3)
+    except nep.NoServerError:
+        return True
+    except nep.NepError:
+        return False
+    raise AssertionError("a server that has ended replied")
+
+
 @pytest.mark.parametrize("version", VERSIONS)
 def test_original_client_receives_replies_and_error_replies(
     originals: Peers, port: int, version: str
@@ -56,7 +67,7 @@ def test_original_client_receives_replies_and_error_replies(
         assert client.hears({"nep_error": "LookupError", "reason": "no such thing"})
         client.tell({"n": 2})
         assert client.hears({"heard": {"n": 2}})
-        assert (server.calls, server.errors) == (5, 1)
+        eventually(lambda: (server.calls, server.errors) == (5, 1))
 
 
 @pytest.mark.parametrize("version", VERSIONS)
@@ -81,8 +92,7 @@ def test_original_server_replies_to_each_call_also_after_a_restart(
         futures = [client.call_async({"n": n}) for n in range(20)]
         assert [each.result(LONG_S) for each in futures] == [{"echo": {"n": n}} for n in range(20)]
         server.kill()
-        with pytest.raises(nep.NoServerError):
-            client.call({}, timeout_s=0.3)
+        eventually(lambda: has_no_server(client))
         originals.start(version, "server_at", str(port)).wait_ready()
         assert client.call({"again": 1}) == {"echo": {"again": 1}}
 

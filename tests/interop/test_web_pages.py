@@ -65,14 +65,14 @@ def test_client_subscribes_publishes_calls_and_serves_like_its_examples(
     page.tell(["listen", "/chatter", "std_msgs/String"])
     assert page.hears({"data": "hello \u65e5\u672c"})
     page.tell(["talk", "/listener", "std_msgs/String", {"data": "hi"}])
-    assert heard.listen(timeout_s=30) == (True, "hi")
+    assert heard.listen(timeout_s=60) == (True, "hi")
     page.tell(["call", "/add_two_ints", {"a": 1, "b": 2}])
     assert page.hears({"sum": 3})
     page.tell(["call", "/add_two_ints", {}])
     page.wait(lambda: "KeyError" in str(page.got[-1]), "the error of a service")
     page.tell(["serve", "/set_bool"])
     eventually(lambda: "/set_bool" in node.graph().services)
-    answer = node.new_client("/set_bool", timeout_s=30).call({"data": True})
+    answer = node.new_client("/set_bool", timeout_s=60).call({"data": True})
     assert answer == {"success": True, "message": "set"}
     names = ("getTopics", "getNodes", "getTopicType") if client == "roslib" else (
         "get_topics", "get_nodes", "get_topic_type",
@@ -117,7 +117,7 @@ def test_roslib_receives_a_close_frame_when_the_server_closes(
         page = started(clients, "roslib", first)
         page.tell(["listen", "/chatter", "std_msgs/String"])
         eventually(lambda: "/chatter" in node.graph().topics)
-    assert page.process.wait(30) == 0  # by a close frame, not by a broken connection
+    assert page.process.wait(60) == 0  # by a close frame, not by a broken connection
     eventually(lambda: not node.graph().topics)
 
 
@@ -136,7 +136,7 @@ def test_foxglove_client_receives_publishes_and_calls_services(
     page.tell(["listen", "/picture"])
     page.wait(lambda: "/picture" in str(page.got[-1]) and page.got[-1]["value"] > 50, "an image")
     page.tell(["talk", "/cmd", "geometry_msgs/Twist", {"linear": {"x": 2.0}}])
-    assert heard.listen(timeout_s=30) == (True, Twist(linear=Vector3(x=2.0)))
+    assert heard.listen(timeout_s=60) == (True, Twist(linear=Vector3(x=2.0)))
     page.tell(["call", "/add_two_ints", 7, {"a": 1, "b": 2}])
     assert page.hears({"callId": 7, "encoding": "json", "value": {"sum": 3}})
     page.tell(["call", "/add_two_ints", 8, {}])
@@ -145,6 +145,6 @@ def test_foxglove_client_receives_publishes_and_calls_services(
     page.wait(lambda: any("published" in each for each in page.got), "the graph")
     assert [each.client for each in server.pages] == ["Foxglove"]
     server.close()
-    assert page.process.wait(30) == 0
+    assert page.process.wait(60) == 0
     page.wait(lambda: {"closed": 1001} in page.got, "the close code")
     assert not [each for each in page.got if "error" in each]

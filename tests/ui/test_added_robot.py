@@ -159,7 +159,7 @@ def test_virtual_robot_in_two_files_is_started_commanded_stopped_and_drawn(
 
             def answer(id: str, *awaited: str) -> dict[str, object]:
                 while True:
-                    arrived, reply = answers.listen(timeout_s=30.0)
+                    arrived, reply = answers.listen(timeout_s=60.0)
                     assert arrived, "the robot didn't reply"
                     if reply["id"] == id and reply["state"] in awaited:
                         return reply
@@ -169,6 +169,7 @@ def test_virtual_robot_in_two_files_is_started_commanded_stopped_and_drawn(
                     states.append(RobotState.parse(message.payload))
                 return states[-1] if states else RobotState()
 
+            until(lambda: commands.subscribers == 1)  # a command sent earlier would be lost
             told = {"op": "invoke", "from": "me"}
             commands.publish({**told, "id": "1", "action": "slide", "input": {"metres": 0.5}})
             assert answer("1", "succeeded", "failed")["output"] == {"x": 0.5}

@@ -80,7 +80,7 @@ def test_test_page_shows_topics_and_publishes(browser: Browser, server: WebServe
     browser.evaluate(f"{choose % '/camera'}.click()")
     browser.wait("document.getElementById('picture').naturalWidth === 6")
     browser.evaluate("document.querySelector('#form button').click()")
-    assert heard.listen(timeout_s=30)[0]
+    assert heard.listen(timeout_s=60)[0]
     assert server.pages[0].title == browser.title()
     browser.evaluate("window.isBeforeReload = true")
     browser.triggerAction(QWebEnginePage.WebAction.Reload)  # the reloaded address contains no token
@@ -101,6 +101,6 @@ def test_starter_page_shows_messages_and_publishes(
     browser.load(QUrl(server.test_page_url.replace("/?", "/starter.html?")))
     browser.wait("document.getElementById('message')?.textContent === 'hello'")
     browser.evaluate("document.getElementById('button').click()")
-    assert clicks.listen(timeout_s=30) == (True, {"pressed": True})
+    assert clicks.listen(timeout_s=60) == (True, {"pressed": True})
     assert [each.title for each in server.pages] == [browser.title()]
     assert browser.said == []

@@ -84,7 +84,7 @@ def test_page_of_this_computer_connects_and_page_of_a_disallowed_origin_is_rejec
             "sum": 3,
             "topics": True,
         }
-        assert heard.listen(timeout_s=30) == (True, "from the page")
+        assert heard.listen(timeout_s=60) == (True, "from the page")
         (name,) = server.page_names
         assert name.startswith("web_localhost:8000_")
         page.setHtml("")
@@ -110,6 +110,6 @@ def test_example_page_of_the_guide_shows_messages_and_publishes_clicks(
 
         qtbot.waitUntil(is_shown)
         page.runJavaScript("document.body.click()")
-        assert clicks.listen(timeout_s=30) == (True, {"pressed": True})
+        assert clicks.listen(timeout_s=60) == (True, {"pressed": True})
         page.setHtml("")
         qtbot.waitUntil(lambda: not server.page_names)

@@ -15,7 +15,7 @@ import zmq
 from nep.programs.gateway.gateway import Gateway
 from nep.programs.gateway.processes import SystemProcesses
 
-LONG_MS = 30_000
+LONG_MS = 60_000
 
 
 class FakeNative:

@@ -126,12 +126,12 @@ def test_huge_subscription_filter_closes_only_its_connection(gateway, original):
         monitor = odd.get_monitor_socket(zmq.EVENT_DISCONNECTED)
         odd.connect(sys.argv[1])
         odd.send(bytes([1]) + b"t" * 5_000_000)
-        ended = bool(monitor.poll(10_000))
+        ended = bool(monitor.poll(60_000))
         os._exit(0 if ended else 1)  # its own tree is as deep: without closing anything
     """
     attacker = [sys.executable, "-c", code, f"tcp://127.0.0.1:{port + 1}"]
     with original.subscriber(port + 1, b"t") as subscriber, original.publisher(port) as publisher:
         original.publish_until(publisher, b't {"n":1}', lambda: subscriber.poll(0))
-        assert subprocess.run(attacker, timeout=60, check=False).returncode == 0, "it was not disconnected"
+        assert subprocess.run(attacker, timeout=150, check=False).returncode == 0, "it was not disconnected"
         original.waiting(subscriber)
         original.publish_until(publisher, b't {"n":2}', lambda: subscriber.poll(0))

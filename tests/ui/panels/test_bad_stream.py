@@ -73,7 +73,8 @@ def test_undecodable_stream_raises_one_alert_with_exact_count_and_no_dialog(
             return [alert.count for alert in panel.shown_alerts] == [SENT]
 
         qtbot.waitUntil(counted)
-        assert f"{SENT} messages on /bad" in window.banner.banner.accessibleName()
+        words = f"{SENT} messages on /bad"
+        qtbot.waitUntil(lambda: (window.tick(), words in window.banner.banner.accessibleName())[1])
         assert window.banner.isVisible()
         assert len(seen) == 1, "it is the same row all the time: its button can be pressed"
         assert [each for each in QApplication.topLevelWidgets() if each.isVisible()] == windows

@@ -121,7 +121,7 @@ def settle(qtbot, panel: GraphPanel) -> None:
         is_shown = scene is not None and scene.graph == panel._requested_graph
         return not panel._thread.is_busy and is_shown and not panel.canvas._pending_items
 
-    qtbot.waitUntil(is_there, timeout=20_000)
+    qtbot.waitUntil(is_there, timeout=60_000)
 
 
 def key_of(panel: GraphPanel, name: str) -> str:
@@ -201,7 +201,12 @@ def test_only_changed_items_are_repainted(panel: GraphPanel, window: Window, qtb
         panel.canvas.schedule_update()
         return panel.canvas.update_stats(panel._stats_of)
 
-    qtbot.wait(1)
+    def rests() -> bool:
+        painted = panel.canvas.paint_count
+        qtbot.wait(1)
+        return panel.canvas.paint_count == painted
+
+    qtbot.waitUntil(rests)
     painted = panel.canvas.paint_count
     show(window, graph())  # an unchanged graph
     assert renewed() == 0
@@ -483,7 +488,7 @@ def test_large_scene_is_built_in_one_tick_and_painted_in_the_next(
         panel.refresh()
         return panel._pending_scene is not None
 
-    qtbot.waitUntil(is_coming, timeout=20_000)
+    qtbot.waitUntil(is_coming, timeout=60_000)
     coming = panel._pending_scene
     assert panel.canvas.scene is before
     panel.refresh()

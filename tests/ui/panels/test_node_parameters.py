@@ -35,7 +35,7 @@ class World:
         """Pass the robot's latched parameters to the session and refresh the panel."""
         topic = parameters_topic(self.robot.id)
         with self.window.session.live.source.node.new_sub(topic, "json") as kept:
-            message = kept.receive(5.0)
+            message = kept.receive(60.0)
         assert message is not None
         self.window.session.live.source.send(
             Message(topic, bytes(message.data), "json", "json", seq=message.seq)
@@ -49,7 +49,7 @@ class World:
 
     def settle(self, qtbot) -> None:
         """Wait until the robot has replied, then update the panel with its parameters."""
-        qtbot.waitUntil(lambda: self._refreshed() == "", timeout=20_000)
+        qtbot.waitUntil(lambda: self._refreshed() == "", timeout=60_000)
         self.hear()
 
     def _refreshed(self) -> str:

@@ -96,7 +96,7 @@ def test_sending_arms_only_the_topic_of_the_message_and_the_switch_disarms(windo
     panel.list.select_key("b")
     assert panel.form.send_button.text() == "Arm and send"
     QTest.keyClick(panel.form.edit.edit, Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
-    assert heard.listen(timeout_s=20.0) == (True, {"x": 0})
+    assert heard.listen(timeout_s=60.0) == (True, {"x": 0})
     ticks(window, panel, 7)
     assert acting.arming.targets == (Target("topic", "/cmd_vel"),)
     assert panel.form.send_button.text() == "Send"
@@ -104,7 +104,7 @@ def test_sending_arms_only_the_topic_of_the_message_and_the_switch_disarms(windo
     assert [token.text() for token in panel.strip.tokens] == ["/cmd_vel"]
     assert panel.strip.text_label.text() == "5:00 left"
     press(panel.form.repeat_button)
-    assert heard.listen(timeout_s=20.0)[0]
+    assert heard.listen(timeout_s=60.0)[0]
     ticks(window, panel, 7)
     assert states(panel)[1] == "50.0/s"
     assert panel.badge() == ("1", "warn")
@@ -158,9 +158,9 @@ def test_robot_command_topic_requires_another_confirmation(window, panel) -> Non
     press(panel.form.send_button)
     ticks(window, panel)
     press(panel.strip.allow_button)
-    assert heard.listen(timeout_s=20.0) == (True, {"x": 0})
+    assert heard.listen(timeout_s=60.0) == (True, {"x": 0})
     press(panel.form.send_button)  # still armed: no second question
-    assert heard.listen(timeout_s=20.0) == (True, {"x": 0})
+    assert heard.listen(timeout_s=60.0) == (True, {"x": 0})
     acting.disarm()
     press(panel.form.send_button)
     assert acting.question is not None
@@ -181,7 +181,7 @@ def test_real_robot_is_not_moved_without_permission(window, panel) -> None:
     assert question is not None
     assert heard.receive(0.0) is None
     session.fleet.permission.answer(is_allowed=True)
-    assert heard.listen(timeout_s=20.0) == (True, {"x": 0})
+    assert heard.listen(timeout_s=60.0) == (True, {"x": 0})
 
 
 def test_last_message_is_the_template(window, panel) -> None:

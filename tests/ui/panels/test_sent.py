@@ -53,7 +53,7 @@ def test_sent_messages_are_listed_copied_and_resent_while_armed(qtbot, window) -
     assert window.commands == ["publish.new"]
     heard = session.live.source.listen("/words", "json")
     assert acting.send(WORD) == ""
-    assert heard.listen(timeout_s=20.0)[0]
+    assert heard.listen(timeout_s=60.0)[0]
     ticks(window, panel)
     assert rows(panel) == [
         ["/words", "Word, 1 subscriber", "", "Publish"],
@@ -67,7 +67,7 @@ def test_sent_messages_are_listed_copied_and_resent_while_armed(qtbot, window) -
     panel.refresh()
     assert panel.repeat_button.isEnabled()
     press(panel.repeat_button)
-    assert heard.listen(timeout_s=20.0) == (True, {"word": "yes"})
+    assert heard.listen(timeout_s=60.0) == (True, {"word": "yes"})
     ticks(window, panel)
     assert rows(panel)[0] == ["/words", "Word, 1 subscriber", "\u00d7 2", "Publish"]
     assert panel.selected_record() is not None, "what is chosen stays chosen"

@@ -108,7 +108,7 @@ def test_recorded_topics_are_selected_renamed_armed_confirmed_sent_and_counted(q
     until(qtbot, window, panel, lambda: going[0].subscriber_count)
     replay.play()
     until(qtbot, window, panel, lambda: sum(each.count + each.dropped_count for each in going) == COUNT)
-    assert heard.listen(timeout_s=20.0)[0]
+    assert heard.listen(timeout_s=60.0)[0]
     session.tick(), panel.refresh()
     sent = sum(each.count for each in going)
     assert panel.strip.summary_label.text().startswith(f"{sent} sent")

@@ -291,9 +291,8 @@ def test_requested_topic_is_selected_when_listed(panel, window) -> None:
 
 def test_topic_name_of_twenty_letters_fits_the_default_width(qtbot, panel) -> None:
     panel.resize(640, 400)
-    qtbot.wait(10)
-    room = panel.table.columnWidth(place_of(panel, "topic"))
-    assert room >= panel.theme.font("mono").pixelSize() * 0.6 * len("/Pepper/head_touched")
+    needed = panel.theme.font("mono").pixelSize() * 0.6 * len("/Pepper/head_touched")
+    qtbot.waitUntil(lambda: panel.table.columnWidth(place_of(panel, "topic")) >= needed)
 
 
 def test_context_menu_of_a_topic_offers_all_its_commands(panel, window) -> None:

@@ -115,6 +115,7 @@ def test_setting_added_in_one_file_is_shown_stored_typed_and_noticed(
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(400)
 def test_type_of_an_added_setting_is_checked(tmp_path: Path) -> None:
     pytest.importorskip("mypy")
     (tmp_path / "settings_of_the_test.py").write_text(SOURCE, "utf-8")

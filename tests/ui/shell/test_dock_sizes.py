@@ -46,7 +46,7 @@ def test_side_columns_are_fixed_in_the_behaviour_and_grow_in_the_developer_layou
     assert window.bench is not None
     docks = window.bench.docks
     qtbot.waitUntil(lambda: abs(docks["sensors"].height() - 140) <= 1)
-    assert abs(docks["problems"].height() - 124) <= 1
+    qtbot.waitUntil(lambda: abs(docks["problems"].height() - 124) <= 1)
     commands.run("layout.developer")
     names = ("topics", "inspector")
     for size, wanted in (((1440, 900), (640, 330)), ((1920, 1080), (815, 417))):

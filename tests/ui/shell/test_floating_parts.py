@@ -145,8 +145,8 @@ def test_focus_ring_surrounds_the_focused_widget_and_follows_its_geometry(
     assert ring.isVisible()
     assert ring.geometry() == second.geometry().adjusted(-4, -4, 4, 4)
     place.resize(900, 300)
-    QTest.qWait(1)
-    assert ring.geometry() == second.geometry().adjusted(-4, -4, 4, 4)
+    qtbot.waitUntil(lambda: second.width() > 800)
+    qtbot.waitUntil(lambda: ring.geometry() == second.geometry().adjusted(-4, -4, 4, 4))
     second.hide()
     qtbot.waitUntil(lambda: ring.target is first)
     place.setFocus()
@@ -241,11 +241,9 @@ def test_focus_ring_is_hidden_while_its_widget_is_scrolled_out_of_view(
     QTest.qWait(1)
     QTest.keyClick(place.windowHandle(), Qt.Key.Key_Tab)
     button.setFocus(Qt.FocusReason.TabFocusReason)
-    QTest.qWait(1)
-    assert ring.target is button
+    qtbot.waitUntil(lambda: ring.target is button)
     area.verticalScrollBar().setValue(0)
-    QTest.qWait(1)
-    assert not ring.isVisible()
+    qtbot.waitUntil(lambda: not ring.isVisible())
 
 
 def test_focus_ring_survives_deletion_of_its_widget(qtbot, place: QWidget, theme: Theme) -> None:

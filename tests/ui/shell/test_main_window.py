@@ -154,15 +154,15 @@ def test_docks_of_both_layouts_have_their_default_sizes_and_positions(
     commands.run("layout.behaviour")
     docks = window.benches["behaviour"].docks
     qtbot.waitUntil(lambda: abs(docks["robot"].width() - 384) <= 2)
-    assert abs(docks["problems"].height() - 124) <= 6
-    assert docks["problems"].width() == docks["behaviour"].width()
+    qtbot.waitUntil(lambda: abs(docks["problems"].height() - 124) <= 6)
+    qtbot.waitUntil(lambda: docks["problems"].width() == docks["behaviour"].width())
     right = {docks[name].x() for name in ("robot", "camera", "sensors")}
     assert len(right) == 1
     assert docks["robot"].x() - docks["behaviour"].geometry().right() - 1 == 8
     commands.run("layout.developer")
     docks = window.benches["developer"].docks
     qtbot.waitUntil(lambda: abs(docks["inspector"].width() - 330) <= 2)
-    assert abs(docks["topics"].width() - 640) <= 4
+    qtbot.waitUntil(lambda: abs(docks["topics"].width() - 640) <= 4)
     assert docks["inspector"].x() - docks["topics"].geometry().right() - 1 == 6
     assert docks["console"].y() > docks["image"].y()
 
@@ -554,12 +554,15 @@ def test_large_text_clips_no_button_of_the_run_bar(
     show(qtbot, window)
     window.show_layout("behaviour")
     window.theme.set_text_percent(percent)
-    QApplication.processEvents()
-    for button in (window.run_bar.run, window.run_bar.pause, window.run_bar.step, window.run_bar.stop):
-        hint = button.sizeHint()
-        assert button.width() >= hint.width()
-        assert button.height() >= hint.height()
-    assert window.run_bar.height() >= window.run_bar.sizeHint().height()
+
+    def fits() -> None:
+        for button in (window.run_bar.run, window.run_bar.pause, window.run_bar.step, window.run_bar.stop):
+            hint = button.sizeHint()
+            assert button.width() >= hint.width()
+            assert button.height() >= hint.height()
+        assert window.run_bar.height() >= window.run_bar.sizeHint().height()
+
+    qtbot.waitUntil(fits)
 
 
 def test_closing_the_window_closes_its_panels_and_stops_its_timer_once(

@@ -127,9 +127,8 @@ def test_texts_of_the_sheet_are_translated_and_not_clipped(
     sheet.rows[1].address.setText("999")
     sheet.rows[1].switch.click()
     sheet.show_states()
-    qtbot.wait(50)  # Qt defers layouts
     data = ("ROS 1", "ROS 2", "Zenoh", "ROS_AUTOMATIC_DISCOVERY_RANGE", f"N{LONG[1:]}.", "local")
     assert [text for _where, text in said_by(sheet) if untranslated(text, *data)] == []
-    assert clipped(sheet) == []
+    qtbot.waitUntil(lambda: clipped(sheet) == [])  # Qt defers layouts
     for row in sheet.rows:
         assert row.state.height() >= row.state.heightForWidth(row.state.width())

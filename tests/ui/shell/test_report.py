@@ -245,10 +245,9 @@ def test_texts_of_the_report_sheet_are_translated_and_not_clipped(
     assert sheet is not None
     answers.path = tmp_path / "report.zip"
     written(qtbot, sheet)
-    qtbot.wait(50)  # Qt defers layouts
     data = (str(tmp_path), "report", "zip", "Esc", session.document.name, *str(tmp_path).split("/"))
     assert [text for _where, text in said_by(sheet) if untranslated(text, *data)] == []
-    assert clipped(sheet) == []
+    qtbot.waitUntil(lambda: clipped(sheet) == [])  # Qt defers layouts
     assert all(each.width() >= each.sizeHint().width() for each in (sheet.write, sheet.show_file))
 
 

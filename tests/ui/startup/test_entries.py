@@ -21,7 +21,7 @@ def python(*arguments: str, words: str = "") -> subprocess.CompletedProcess[str]
         input=words,
         capture_output=True,
         text=True,
-        timeout=30,
+        timeout=140,
         env=environ,
         check=False,
     )

@@ -92,7 +92,7 @@ def test_file_open_events_are_received_before_and_after_the_web_engine_is_loaded
     if hasattr(os, "geteuid") and os.geteuid() == 0:
         environ["QTWEBENGINE_DISABLE_SANDBOX"] = "1"
     done = subprocess.run(
-        [sys.executable, "-c", MAC], env=environ, check=False, capture_output=True, text=True, timeout=100
+        [sys.executable, "-c", MAC], env=environ, check=False, capture_output=True, text=True, timeout=140
     )
     assert done.returncode == 0, done.stderr
     refused, took = done.stdout.splitlines()

@@ -55,7 +55,7 @@ def test_studio_as_root_with_browser_sandbox_exits_with_a_message(tmp_path: Path
     for name in ("QTWEBENGINE_DISABLE_SANDBOX", "QTWEBENGINE_CHROMIUM_FLAGS"):
         environ.pop(name, None)
     command = [sys.executable, "-m", "app"]
-    done = subprocess.run(command, env=environ, capture_output=True, text=True, check=False, timeout=50)
+    done = subprocess.run(command, env=environ, capture_output=True, text=True, check=False, timeout=140)
     assert done.returncode == 2
     assert "can't run as root with its sandbox; start Studio as another user" in done.stderr
 

@@ -65,7 +65,7 @@ class Told(SandboxTest):
 )
 def test_each_namespace_restriction_is_detected() -> None:
     done = subprocess.run(
-        [sys.executable, "-c", GUARDED], cwd=ROOT, capture_output=True, text=True, timeout=60, check=True
+        [sys.executable, "-c", GUARDED], cwd=ROOT, capture_output=True, text=True, timeout=140, check=True
     )
     free, *guarded = done.stdout.split()
     if free == "False":

@@ -28,11 +28,13 @@ from app.ui.startup.single_instance import (
     socket_name,
 )
 
-WAIT_MS = 30_000
+WAIT_MS = 60_000
 SECOND = """
 import sys
 from pathlib import Path
+from app.ui.startup import single_instance
 from app.ui.startup.single_instance import StartRequest, send_request
+single_instance.CONNECT_TIMEOUT_MS = single_instance.REPLY_TIMEOUT_MS = 60_000  # a busy computer replies late
 files = tuple(Path(each) for each in sys.argv[2:])
 sys.exit(0 if send_request(sys.argv[1], StartRequest(files)) else 3)
 """
@@ -75,7 +77,9 @@ STARTING = """
 import sys
 from pathlib import Path
 from app.core.storage.file_lock import FileLock
+from app.ui.startup import single_instance
 from app.ui.startup.single_instance import StartRequest, pass_to_running
+single_instance.CONNECT_TIMEOUT_MS = single_instance.REPLY_TIMEOUT_MS = 60_000
 print("begun", flush=True)
 turn = FileLock(Path(sys.argv[2]))
 there = pass_to_running(sys.argv[1], StartRequest((Path("a.nepb"),)), turn, 60.0)

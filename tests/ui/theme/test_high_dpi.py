@@ -20,6 +20,7 @@ sys.exit(pytest.main(["-q", "tests/ui/theme/test_text_sizes.py::test_window_clip
 """
 
 
+@pytest.mark.timeout(400)
 @pytest.mark.parametrize("scale", ["1.25", "1.5"])
 def test_window_clips_no_text_at_fractional_scales(scale: str) -> None:
     done = subprocess.run(
@@ -28,7 +29,7 @@ def test_window_clips_no_text_at_fractional_scales(scale: str) -> None:
         env={**os.environ, "QT_QPA_PLATFORM": "offscreen", "QT_SCALE_FACTOR": scale},
         capture_output=True,
         text=True,
-        timeout=140,
+        timeout=380,
         check=False,
     )
     assert done.returncode == 0, f"{done.stdout[-3000:]}\n{done.stderr[-1000:]}"

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QPoint, QRect
+from PySide6.QtWidgets import QWidget
 
 from app import resources
 from app.core.run.view import RunView
@@ -74,8 +75,14 @@ def settle(qtbot, root, *, longer: bool) -> None:
     """Wait until the layouts are stable, with longer texts on request."""
     if longer:
         lengthen(root)
-    for _ in range(2):
+    before: list[QRect] = []
+
+    def rests() -> bool:
         qtbot.wait(SETTLE_MS)
+        last, before[:] = list(before), [each.geometry() for each in root.findChildren(QWidget)]
+        return last == before
+
+    qtbot.waitUntil(rests)
 
 
 @pytest.mark.parametrize(
@@ -219,7 +226,5 @@ def test_visible_status_items_are_not_clipped_at_any_text_size(qtbot, theme: The
     )
     qtbot.wait(SETTLE_MS)
     bar.resize(1100, bar.sizeHint().height())
-    qtbot.wait(SETTLE_MS)
-    assert bar.width() == 1100
-    assert clipped(bar) == []
+    qtbot.waitUntil(lambda: bar.width() == 1100 and clipped(bar) == [])
     assert all(item.width() >= 40 for item in bar.findChildren(StatusItem) if item.isVisible())

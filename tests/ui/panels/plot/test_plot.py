@@ -623,9 +623,7 @@ def test_export_that_cannot_be_written_is_reported(qtbot, panel, window, tmp_pat
             lambda: panel.refresh() or any(each.startswith("Can't export") for each in window.toasts)
         )
         window.toasts.clear()
-    assert not [
-        each for each in threading.enumerate() if each.name == "studio-plot-export" and each.is_alive()
-    ]
+    qtbot.waitUntil(lambda: "studio-plot-export" not in {each.name for each in threading.enumerate()})
 
 
 def test_curve_name_is_copied(panel, window) -> None:
