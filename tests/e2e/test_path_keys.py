@@ -66,9 +66,18 @@ def look_at_topics(studio: Studio, film: Film, fingers: Fingers) -> None:
     with film.step("Ctrl+K and a few letters: the Developer layout lists the topics"):
         fingers.do("developer", "Developer layout")
         studio.row("Topics", "/Pepper/state")
-    with film.step("Arrow keys choose a topic, Enter shows its newest message"):
+    with film.step("A filter and an arrow key choose a topic, Enter shows its newest message"):
         fingers.until_on("F6", name="Topics", kind="TopicsTable")
-        fingers.press("Down", "Down", "Down", "Return")
+        fingers.press("/")
+        studio.find("Filter topics", focus=True)
+        studio.screen.type("faces")  # topics of the program that has ended leave the list at any time
+        until(
+            lambda: [row["texts"][0] for row in studio.rows("Topics")] == ["/Pepper/faces"],
+            "only this topic is listed",
+        )
+        fingers.press("Return")
+        studio.find("Topics", kind="TopicsTable", focus=True)
+        fingers.press("Down", "Return")
         until(lambda: studio.values("Newest message"), "the inspector shows it")
     with film.step("F6: the Inspector; Ctrl+F finds a value in it"):
         fingers.until_on("F6", **{"in": "inspector"})
