@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import shutil
-import socket
 from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 
@@ -13,6 +12,7 @@ import pytest
 from dev import virtual_screen
 from tests.e2e.studio import Studio, save_picture, terminate_all
 from tests.e2e.x11 import Screen
+from tests.ports import free_port
 
 HERE = Path(__file__).parent
 
@@ -52,9 +52,7 @@ def screen() -> Iterator[Screen]:
 @pytest.fixture
 def address(monkeypatch: pytest.MonkeyPatch) -> str:
     """Address of this test's master, which may not be running yet."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        address = f"127.0.0.1:{probe.getsockname()[1]}"
+    address = f"127.0.0.1:{free_port()}"
     monkeypatch.setenv("NEP_MASTER", address)
     return address
 

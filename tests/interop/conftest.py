@@ -22,6 +22,7 @@ import pytest
 
 from nep.masters.master import is_running
 from tests.interop.port_lock import one_run_at_a_time
+from tests.ports import free_port
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 CACHE = REPOSITORY / ".cache" / "peers"
@@ -321,9 +322,7 @@ def peers(fixed_ports: None) -> Iterator[Peers]:
 @pytest.fixture
 def nep_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     """Separate master address and state folder for one test."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        address = f"127.0.0.1:{probe.getsockname()[1]}"
+    address = f"127.0.0.1:{free_port()}"
     monkeypatch.setenv("NEP_MASTER", address)
     monkeypatch.setenv("NEP_STATE_DIR", str(tmp_path / "state"))
     return address

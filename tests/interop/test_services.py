@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 from collections.abc import Iterator
 
 import pytest
@@ -10,6 +9,7 @@ import pytest
 import nep
 from tests.interop.conftest import LONG_S, Peers, Program
 from tests.nep.programs import eventually
+from tests.ports import free_port
 
 pytestmark = [pytest.mark.interop]
 VERSIONS = ("0.5.3.5", "0.5.4.5", "0.5.4.8")
@@ -25,9 +25,7 @@ def originals() -> Iterator[Peers]:
 
 @pytest.fixture
 def port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+    return free_port()
 
 
 def has_no_server(client: nep.Client) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ from app.ui.shell.commands import table
 from app.ui.shell.start_page.page import Example
 from app.ui.widgets.file_dialogs import FileKind, resolve_kind
 from tests.blocks.fakes import until
+from tests.ports import free_port
 from tests.ui import fakes
 from tests.ui.sample_data import WORKSPACE, Invocation, pepper
 
@@ -221,9 +221,7 @@ def begin_run(session: fakes.Session, state: str) -> None:
 
 def free_address() -> str:
     """Return a loopback address with an unused port."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"127.0.0.1:{probe.getsockname()[1]}"
+    return f"127.0.0.1:{free_port()}"
 
 
 def examples(folder: Path) -> list[Example]:
