@@ -29,7 +29,11 @@ assert bus.registerService("org.freedesktop.portal.Desktop")
 print("up", flush=True)
 app.exec()
 """
-ASK = "from app.ui.startup.portal import has_file_chooser; print(has_file_chooser())"
+ASK = """
+from app.ui.startup import portal
+portal.REPLY_TIMEOUT_MS = 60_000  # a busy computer replies late
+print(portal.has_file_chooser())
+"""
 BOTH = """
 import subprocess, sys
 def ask():
