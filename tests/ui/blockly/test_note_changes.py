@@ -73,7 +73,7 @@ def drag(them: Person, selector: str, inside: QPoint, way: QPoint) -> None:
 
 def one_step(qtbot, them: Person, told: list[dict], which: str, before: dict) -> Note:
     """Wait for the reported change of a note, undo and redo it; return the changed note."""
-    qtbot.waitUntil(lambda: told and WHICH[which](told[-1]) != WHICH[which](before), timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: bool(told) and WHICH[which](told[-1]) != WHICH[which](before), timeout=WAIT_MS)
     them.wait_for("!document.querySelector('.blocklyDragging')")
     them.render()  # what was dropped snaps to the grid
     qtbot.waitUntil(lambda: told[-1] == them.newest(), timeout=WAIT_MS)
@@ -123,6 +123,6 @@ def test_collapsing_a_canvas_note_is_reported_and_is_one_undo_step(qtbot, them, 
 def test_undo_restores_a_removed_note_unchanged(qtbot, them, told):
     before = them.newest()
     them.click(".nepNoteButton:last-of-type", dx=8, dy=8)
-    qtbot.waitUntil(lambda: told and "icons" not in str(told[-1]), timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: bool(told) and "icons" not in str(told[-1]), timeout=WAIT_MS)
     them.view.undo()
     qtbot.waitUntil(lambda: told[-1] == before, timeout=WAIT_MS)

@@ -339,7 +339,9 @@ def loading_editor(qtbot) -> BlocklyView:
     for _ in range(20):
         view = editor(qtbot, editor_definitions([robot("Pepper")]), 1320, 700)
         view.show()
-        qtbot.waitUntil(lambda view=view: view.web and view.web.keyboard_target(), timeout=WAIT_MS)
+        qtbot.waitUntil(
+            lambda view=view: view.web is not None and view.web.keyboard_target() is not None, timeout=WAIT_MS
+        )
         if not view.is_ready:
             return view
         view.hide()

@@ -217,7 +217,7 @@ def test_external_change_is_one_undo_step(qtbot, two, view) -> None:
     view.undo()
     two.wait_for(f"!({here}).includes('added')")
     assert two.ask(here) == before
-    qtbot.waitUntil(lambda: told and "added" not in told[-1][1].text, timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: bool(told) and "added" not in told[-1][1].text, timeout=WAIT_MS)
     assert told[-1][0] == "a"
     view.redo()
     two.wait_for(f"({here}).includes('added')")
