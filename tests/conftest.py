@@ -19,7 +19,7 @@ from xdist.workermanage import WorkerController
 from nep.masters.master import Master
 from nep.text import escaped
 from tests import leftovers, long_groups
-from tests.nep.programs import GREETINGS_S
+from tests.nep.meeting import extend_handshakes
 from tests.scheduler import FileScheduling
 
 gc.disable()  # during collection: its objects stay alive, so scanning them is wasted time
@@ -185,7 +185,7 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
 
     A test that waits for a handshake to time out needs this time.
     """
-    monkeypatch.setattr("nep.backends.zeromq.transport.HANDSHAKE_TIMEOUT_S", GREETINGS_S)
+    extend_handshakes(monkeypatch)
 
 
 @pytest.fixture

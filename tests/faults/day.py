@@ -94,6 +94,7 @@ class Day:
             traffic.code_of(part),
             options,
             before=host.inside(),
+            is_patient=False,  # a peer may be unreachable
             NEP_MASTER=self.address,
             XDG_RUNTIME_DIR=f"/dev/shm/{host.name}",
         )

@@ -19,15 +19,24 @@ ROOT = Path(__file__).parents[2]
 LETTERS = {"PYTHONIOENCODING": "utf-8"} if sys.platform == "win32" else {}
 """Environment for UTF-8 output; on Windows a pipe has the country's code page by default."""
 GREETINGS_S = 40.0
-"""Seconds that nodes wait for handshakes in tests with the fixture `patient`."""
+"""Seconds that nodes wait for handshakes in a `Program`, and in tests with the fixture `patient`."""
+_PATIENT = f"import nep.backends.base; nep.backends.base.HANDSHAKE_TIMEOUT_S = {GREETINGS_S}\n"
+"""Code before that of a program. Back ends, which are imported when they are used, copy the value."""
 
 
 class Program:
-    """Running Python program whose input and output are read and written by lines."""
+    """Running Python program whose input and output are read and written by lines.
 
-    def __init__(self, code: str, *args: str, before: Sequence[str] = (), **environment: str) -> None:
+    If it `is_patient`, its nodes wait long for handshakes, so that a busy computer doesn't lose their first
+    messages.
+    """
+
+    def __init__(
+        self, code: str, *args: str, before: Sequence[str] = (), is_patient: bool = True, **environment: str
+    ) -> None:
+        code = textwrap.dedent(code)
         self.process = subprocess.Popen(
-            [*before, sys.executable, "-u", "-c", textwrap.dedent(code), *args],
+            [*before, sys.executable, "-u", "-c", _patient(code) if is_patient else code, *args],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -70,10 +79,20 @@ class Program:
         self.process.communicate()
 
 
+def _patient(code: str) -> str:
+    """Return the code of a program with a long time limit for handshakes if it creates nodes.
+
+    In ROS, killed subscribers stay registered, and a new publisher waits for them.
+    """
+    return _PATIENT + code if "nep.node(" in code and '"ros' not in code else code
+
+
 @contextmanager
-def running(code: str, *args: str, before: Sequence[str] = (), **environment: str) -> Iterator[Program]:
+def running(
+    code: str, *args: str, before: Sequence[str] = (), is_patient: bool = True, **environment: str
+) -> Iterator[Program]:
     """Start a program; kill it at the end. `before` is a command prefix that starts it."""
-    program = Program(code, *args, before=before, **environment)
+    program = Program(code, *args, before=before, is_patient=is_patient, **environment)
     try:
         yield program
     finally:

@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
+import pytest
+
 import nep
 from nep.masters.master import Master
 from nep.programs.bridges import (
@@ -19,6 +21,7 @@ from nep.programs.bridges import (
     TopicEnd,
     side_configuration,
 )
+from tests.nep.meeting import extend_handshakes
 from tests.nep.programs import eventually
 
 if TYPE_CHECKING:
@@ -53,7 +56,9 @@ class Net:
 
 @contextmanager
 def nets(*backends: str) -> Iterator[list[Net]]:
-    with ExitStack() as opened:
+    """Yield a network of each back end; nodes wait long for handshakes."""
+    with pytest.MonkeyPatch.context() as monkeypatch, ExitStack() as opened:
+        extend_handshakes(monkeypatch)
         yield [opened.enter_context(Net(each)) for each in backends]
 
 
