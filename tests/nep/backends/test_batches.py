@@ -32,7 +32,7 @@ IDS = itertools.count(1)
 
 
 @pytest.fixture
-def node(master: Master) -> Iterator[nep.Node]:
+def node(master: Master, patient: None) -> Iterator[nep.Node]:
     with nep.node("batches", master=master.address) as made:
         yield made
 

@@ -167,7 +167,7 @@ def test_new_subscriber_does_not_make_an_invalid_payload_raise(make: Make) -> No
     sub = make("b").new_sub("topic")
     pub.publish(bad)
     pub.publish(1)
-    assert sub.listen(timeout_s=2.0) == (True, 1)
+    assert sub.listen(timeout_s=30.0) == (True, 1)
 
 
 def test_rejected_payload_does_not_replace_the_latched_message(make: Make) -> None:
@@ -326,7 +326,7 @@ def test_callbacks_run_in_the_spinning_thread(make: Make) -> None:
     node.new_callback("example", "json", callback)
     for n in range(3):
         pub.publish({"n": n})
-    node.spin(5.0)
+    node.spin(30.0)
     assert got == [({"n": n}, threading.current_thread().name) for n in range(3)]
 
 
@@ -447,7 +447,7 @@ def test_exception_in_a_callback_propagates_from_spin(make: Make) -> None:
     node.new_callback("example", "json", callback)
     pub.publish(1)
     with pytest.raises(ZeroDivisionError):
-        node.spin(5.0)
+        node.spin(30.0)
 
 
 def test_spin_ends_at_its_timeout_and_on_stop_spin(make: Make) -> None:
@@ -476,7 +476,7 @@ def test_sink_receives_batches_in_a_thread_of_the_node(make: Make) -> None:
     pub = make("a").new_pub("topic")
     for n in range(2000):
         pub.publish(n)
-    assert done.wait(5.0)
+    assert done.wait(30.0)
     assert [n for batch in batches for n in batch] == list(range(2000))
     assert all(name.startswith("nep-") for name in names)
     assert len(batches) < 1000
@@ -567,7 +567,11 @@ def test_close_wakes_a_waiting_subscriber_in_another_thread(make: Make) -> None:
 
 
 @pytest.mark.usefixtures("frequent_switching")
-def test_opening_while_another_thread_closes_the_node_raises_closed_error(make: Make) -> None:
+def test_opening_while_another_thread_closes_the_node_raises_closed_error(
+    make: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for module in ("zeromq.transport", "zenoh.transport", "zenoh.node_services"):  # a peer may have closed
+        monkeypatch.setattr(f"nep.backends.{module}.HANDSHAKE_TIMEOUT_S", 0.5)
     raised: list[BaseException] = []
 
     def open_all(node: nep.Node, has_begun: threading.Event) -> None:
@@ -595,7 +599,7 @@ def test_opening_while_another_thread_closes_the_node_raises_closed_error(make: 
     assert [each for each in raised if not isinstance(each, nep.ClosedError)] == []
     assert len(raised) == 16
     other = make("other")
-    eventually(lambda: "closing" not in names(other.graph()), 5.0)
+    eventually(lambda: "closing" not in names(other.graph()))
 
 
 def test_graph_lists_nodes_topics_publishers_and_subscribers(make: Make) -> None:
@@ -611,7 +615,7 @@ def test_graph_lists_nodes_topics_publishers_and_subscribers(make: Make) -> None
     sub.close()
     eventually(lambda: node.graph().topics["topic"].subscribers == ())
     other.close()
-    assert names(node.graph()) == {"a"}
+    eventually(lambda: names(node.graph()) == {"a"})
 
 
 def test_conflicting_types_and_duplicate_node_names_are_alerts(make: Make) -> None:
@@ -622,7 +626,7 @@ def test_conflicting_types_and_duplicate_node_names_are_alerts(make: Make) -> No
     assert set(ids) == {"name:twin", "type:topic"}
     assert "2 types" in ids["type:topic"]
     second.close()
-    assert first.graph().alerts == ()
+    eventually(lambda: first.graph().alerts == ())
 
 
 def test_concurrent_publishing_from_many_threads_loses_nothing(make: Make) -> None:

@@ -33,7 +33,7 @@ class Nodes:
 
 
 @pytest.fixture
-def make(master: Master) -> Iterator[Nodes]:
+def make(master: Master, patient: None) -> Iterator[Nodes]:
     nodes = Nodes(master)
     yield nodes
     for node in nodes.made:

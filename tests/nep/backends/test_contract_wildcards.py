@@ -262,6 +262,7 @@ def test_restarted_publishers_are_received_after_a_kill(master: Master, backend:
                 program.process.kill()
 
 
+@pytest.mark.usefixtures("patient")
 def test_pattern_is_registered_again_at_a_restarted_master(master: Master) -> None:
     port = master.address
     with nep.node("b", master=port) as node, nep.node("a", master=port) as other:
@@ -271,7 +272,7 @@ def test_pattern_is_registered_again_at_a_restarted_master(master: Master) -> No
         old.publish(1)
         assert read(sub, 1) == [("r/old", 1)]
         with Master(port, learn_s=1.0):
-            eventually(lambda: "r/*" in node.graph().patterns)
+            eventually(lambda: "r/*" in node.graph(30.0).patterns)
             new = other.new_pub("r/new")
             assert new.subscribers == 1
             new.publish(2)
@@ -298,6 +299,7 @@ def test_older_master_without_wildcards_is_reported(
         node.new_sub("r/x")
 
 
+@pytest.mark.usefixtures("patient")
 def test_topics_of_closed_publishers_are_unsubscribed(master: Master) -> None:
     with nep.node("b") as node, nep.node("a") as other:
         sub = node.new_sub("r/*")

@@ -106,10 +106,11 @@ print(node.new_sub("own").listen(), [each for each in node.graph().topics])
             program.say("go on")
             assert program.line() == "True"
             assert program.line() == "(False, {}) ['own']"
-            assert program.process.wait(20) == 0
+            assert program.process.wait(60) == 0
             assert not late.is_closed
 
 
+@pytest.mark.usefixtures("patient")
 def test_publisher_with_a_low_open_file_limit_survives_a_hundred_subscribers(master: Master) -> None:
     """libzmq accepts as many connections as it can; the publisher keeps serving those."""
     code = (
@@ -124,7 +125,7 @@ for line in sys.stdin:
     print(pub.subscribers)
 """
     )
-    with running(code) as program, nep.node("peer", wait_s=5.0) as node:
+    with running(code) as program, nep.node("peer", wait_s=60.0) as node:
         assert program.line() == "ready"
         first = node.new_sub("wanted")
         subscribers = [node.new_sub("wanted", keep="latest") for _ in range(20)]

@@ -38,12 +38,18 @@ def node() -> Iterator[nep.Node]:
 @pytest.mark.parametrize("mode", ["one2many", "many2one"])
 @pytest.mark.parametrize("subscriber_first", [True, False])
 def test_one_sided_direct_connection_delivers_in_each_start_order_without_a_master(
-    node: nep.Node, port: int, wire: str, mode: str, subscriber_first: bool
+    node: nep.Node,
+    port: int,
+    wire: str,
+    mode: str,
+    subscriber_first: bool,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     conf = node.direct("127.0.0.1", str(port), mode, wire=wire)  # type: ignore[arg-type]
     if subscriber_first:
         sub = node.new_sub("t", "json", conf)
-        pub = node.new_pub("t", "json", conf)
+        monkeypatch.setattr("nep.backends.zeromq.transport.DIRECT_WAIT_S", 30.0)
+        pub = node.new_pub("t", "json", conf)  # waits for the subscriber
     else:
         pub = node.new_pub("t", "json", conf)
         sub = node.new_sub("t", "json", conf)
@@ -81,7 +87,7 @@ def test_frames_match_what_a_plain_zeromq_program_receives(
         while not pub.subscribers:
             node.spin(0.01)
         pub.publish(payload)
-        assert plain.poll(2000)
+        assert plain.poll(30_000)
         assert plain.recv_multipart() == [frame]
 
 
@@ -90,7 +96,7 @@ def test_both_framings_are_received_and_other_topics_ignored(node: nep.Node, por
         plain.setsockopt(zmq.LINGER, 0)
         plain.bind(f"tcp://127.0.0.1:{port}")
         sub = node.new_sub("t", "json", node.direct(port=port))
-        assert plain.poll(2000)
+        assert plain.poll(30_000)
         assert plain.recv() == b"\x01"
         for frame in (b't {"n":1}', b'{"n": 2}', b't2 {"n":3}', b"t 4"):
             plain.send(frame)
@@ -152,13 +158,13 @@ def test_many_to_many_connects_to_both_ports_of_a_proxy(node: nep.Node, port: in
         xpub.bind(f"tcp://127.0.0.1:{port + 1}")
         conf = node.direct(port=port, mode="many2many")
         sub = node.new_sub("t", "json", conf)
-        assert xpub.poll(2000)
+        assert xpub.poll(30_000)
         xsub.send(xpub.recv())
         pub = node.new_pub("t", "json", conf)
         while not pub.subscribers:
             assert not xsub.poll(10)  # poll both sockets, as a proxy does
         pub.publish(1)
-        assert xsub.poll(2000)
+        assert xsub.poll(30_000)
         xpub.send(xsub.recv())
         assert sub.listen(timeout_s=30.0) == (True, 1)
 

@@ -111,6 +111,7 @@ def test_pynng_is_not_imported_unless_requested() -> None:
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
+@pytest.mark.usefixtures("patient")
 def test_nanomsg_and_zeromq_subscribers_ignore_publishers_of_the_other_back_end(
     master: Master, caplog: pytest.LogCaptureFixture
 ) -> None:

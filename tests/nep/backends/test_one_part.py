@@ -21,7 +21,7 @@ IDS = itertools.count(1)
 
 
 @pytest.fixture
-def node(master: Master) -> Iterator[nep.Node]:
+def node(master: Master, patient: None) -> Iterator[nep.Node]:
     with nep.node("parts", master=master.address) as made:
         yield made
 

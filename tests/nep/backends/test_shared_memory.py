@@ -30,9 +30,12 @@ LONG_S = 30.0
 _ids = itertools.count(1 << 40)
 _MEMORY = "/dev/shm"
 
-pytestmark = pytest.mark.skipif(
-    shared_memory.free_bytes() < 2**29, reason="shared memory needs 512 MB of room in /dev/shm"
-)
+pytestmark = [
+    pytest.mark.skipif(
+        shared_memory.free_bytes() < 2**29, reason="shared memory needs 512 MB of room in /dev/shm"
+    ),
+    pytest.mark.usefixtures("patient"),
+]
 
 LISTENER = """
     import hashlib, sys

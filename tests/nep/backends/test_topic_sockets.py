@@ -224,6 +224,7 @@ def test_topics_beyond_the_limit_are_reported_until_one_can_be_opened(
     assert topics.sockets.problem == "unreachable"
 
 
+@pytest.mark.usefixtures("patient")
 def test_pattern_receives_through_the_polling_thread_of_systems_without_epoll(
     master: Master, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -180,8 +180,12 @@ def test_all_messages_of_an_unreachable_new_publisher_are_lost(closed_port: str,
         with attacker_at(master) as connection:
             publisher = UnreachablePublisher(connection, closed_port)
             publisher.register()
-            publisher.renew(100)
-            eventually(lambda: subscriber.lost == 100)
+
+            def is_lost() -> bool:
+                publisher.renew(100)  # its lease must not expire
+                return subscriber.lost == 100
+
+            eventually(is_lost)
             publisher.close(130)
             eventually(lambda: subscriber.lost == 130)
         assert subscriber.received == 0

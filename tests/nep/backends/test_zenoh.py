@@ -22,6 +22,7 @@ from nep.backends.zenoh.rendezvous import Rendezvous, SessionEntry
 from nep.protocol.requests import NodeRecord, PublisherRecord, SubscriberRecord
 from tests.nep.programs import Program, eventually, running
 
+pytestmark = pytest.mark.usefixtures("patient")
 _names = itertools.count()
 PEER = """
 import sys, nep
@@ -146,7 +147,7 @@ def test_killed_program_is_removed_and_its_successor_connects_to_the_other_progr
         assert pub.subscribers == 1
         peer.kill()
         eventually(lambda: pub.subscribers == 0)
-        assert names(here) == {"here"}
+        eventually(lambda: names(here) == {"here"})
     with running(PEER, place) as again:
         again.line()
         assert pub.subscribers == 1
@@ -156,8 +157,9 @@ def test_killed_program_is_removed_and_its_successor_connects_to_the_other_progr
 
 @pytest.mark.skipif(sys.platform == "win32", reason="nobody is halted so there")
 def test_hung_subscriber_is_named_and_does_not_block_publishing(
-    make: Make, place: str, caplog: pytest.LogCaptureFixture
+    make: Make, place: str, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("nep.backends.zenoh.transport.HANDSHAKE_TIMEOUT_S", 0.5)
     here, other = make("here"), make("other")
     here.new_sub("t"), other.new_sub("t")
     with running(PEER, place) as peer:
@@ -516,7 +518,10 @@ def test_sessions_opened_simultaneously_all_connect(make: Make) -> None:
     assert nodes[0].new_pub("t").subscribers == 6
 
 
-def test_node_close_during_subscribing_raises_closed_error(make: Make) -> None:
+def test_node_close_during_subscribing_raises_closed_error(
+    make: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("nep.backends.zenoh.transport.HANDSHAKE_TIMEOUT_S", 0.5)
     import threading
 
     node = make("a")
