@@ -6,6 +6,7 @@ victims must not be affected.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -28,6 +29,7 @@ from nep.protocol.requests import (
     Join,
     Leave,
     NodeRecord,
+    Probe,
     PublisherCount,
     PublisherRecord,
     PublisherRemoved,
@@ -46,6 +48,8 @@ from nep.protocol.requests import (
     derive_node_id,
 )
 from tests.nep.programs import eventually
+
+pytestmark = pytest.mark.usefixtures("patient")
 
 OWN_KEY = "an attacker has a key of its own"
 OWN_ID = derive_node_id(OWN_KEY)
@@ -70,10 +74,10 @@ class Attacker:
         return self._call
 
     def ask(self, request: Request) -> Reply:
-        """Send a request and return the reply, which must arrive within 5 s."""
+        """Send a request and return the reply, which must arrive within a minute."""
         call = self.send(request)
         while True:
-            assert self.socket.poll(5000), "the master does not answer"
+            assert self.socket.poll(60_000), "the master does not answer"
             number, answer = encoding.decode_reply(self.socket.recv())
             if number == call and isinstance(answer, Reply):
                 return answer
@@ -416,7 +420,9 @@ def test_eviction_of_a_squatter_is_announced_to_subscribers_before_the_owner(mas
         assert isinstance(squatter.ask(AddPublisher(node(), replace(real, number=0))), AddedReply)
         owned = NodeRecord(derive_node_id("k"), "Owner", "host", 1, key="k")
         assert isinstance(owner.ask(AddPublisher(owned, real)), AddedReply)
-        came, gone, again = (encoding.decode_reply(ear.socket.recv())[1] for _ in range(3))
+        told = (encoding.decode_reply(ear.socket.recv())[1] for _ in itertools.count())
+        notices = (each for each in told if not isinstance(each, Probe))  # of a node that is slow to renew
+        came, gone, again = itertools.islice(notices, 3)
         assert isinstance(gone, PublisherRemoved)
         assert not gone.is_closed
         assert [each.publisher.node_name for each in (came, again)] == ["Mallory", "Owner"]

@@ -40,5 +40,5 @@ def test_node_connects_to_a_master_that_replaces_another_socket_at_its_address()
         wait_for_disconnection()
     with Master(address):
         registering.join(30)
-        assert "topic" in view(address).topics
+        assert "topic" in view(address, 30.0).topics
         node.close()

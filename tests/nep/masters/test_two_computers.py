@@ -46,7 +46,7 @@ import json, nep
 node = nep.node("graph")
 print(json.dumps([each.endpoints for each in node.graph().topics["t"].publishers]))
 """
-WAIT_S = 20.0
+WAIT_S = 60.0
 
 
 def ip(*words: str) -> None:

@@ -46,7 +46,7 @@ def test_callback_can_close_its_own_and_another_subscriber(node: nep.Node) -> No
     pub = node.new_pub("topic")
     pub.publish(1)
     pub.publish(2)
-    node.spin(5.0)
+    node.spin(30.0)
     node.spin(0.05)
     assert got == [1]
 
@@ -160,7 +160,7 @@ def test_blocked_sink_of_one_node_does_not_block_other_nodes(master: Master) -> 
     with nep.node("slow") as slow, nep.node("other") as other:
         slow.new_sub("slow", sink=sink)
         other.new_pub("slow").publish(1)
-        assert held.wait(5.0)
+        assert held.wait(30.0)
         try:
             with nep.node("third") as third:
                 pub, sub = third.new_pub("topic"), third.new_sub("topic")
@@ -201,6 +201,8 @@ def test_all_nodes_flush_concurrently_at_interpreter_exit(master: Master) -> Non
     """
     code = """
     import sys, nep
+    import nep.nodes.node as nodes
+    nodes.FLUSH_TIMEOUT_S = 10.0  # 32 MB must arrive meanwhile
     first = nep.node("first").new_pub("hung", "bytes")
     second = nep.node("second").new_pub("pictures", "bytes")
     third = nep.node("third").new_pub("quiet", "bytes")

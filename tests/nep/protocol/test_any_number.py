@@ -158,7 +158,7 @@ def test_message_with_implausible_sequence_number_raises_an_alert_and_counts_no_
             dealer.setsockopt(zmq.ROUTING_ID, b"0" * 16)
             dealer.connect(f"tcp://{master.address}")
             dealer.send(encoding.encode_request(AddPublisher(NodeRecord("0" * 16, "x", "h", 1), record), 1))
-            assert xpub.poll(5000)
+            assert xpub.poll(60_000)
             for _ in range(2):  # the subscriber's topic filter and hello
                 xpub.recv()
             for number in (1, seq):

@@ -63,7 +63,7 @@ def test_host_name_is_resolved_again_only_after_an_interval(caplog: pytest.LogCa
     def look(now: float) -> None:
         name.resolve(now)
         assert name._thread is not None
-        name._thread.join(5.0)
+        name._thread.join(60.0)
 
     with caplog.at_level(logging.INFO):
         for now in (10.0, 11.0, 14.9, 15.0):
@@ -86,7 +86,9 @@ def shared() -> Iterator[SharedContext]:
     made.release()
 
 
-def test_unanswered_name_lookup_does_not_block_other_nodes(shared: SharedContext, master: Master) -> None:
+def test_unanswered_name_lookup_does_not_block_other_nodes(
+    shared: SharedContext, master: Master, patient: None
+) -> None:
     book = Book("127.0.0.1")
     port = master.address.rpartition(":")[2]
     with nep.node("other") as other:
