@@ -19,7 +19,7 @@ Ask = Callable[..., Any]
 
 
 @pytest.fixture(params=["memory", "zeromq"])
-def where(request: pytest.FixtureRequest, master: Master) -> tuple[str, str]:
+def where(request: pytest.FixtureRequest, master: Master, patient: None) -> tuple[str, str]:
     """Back end and master address."""
     return request.param, f"served-{next(_names)}" if request.param == "memory" else master.address
 

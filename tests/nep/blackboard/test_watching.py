@@ -19,7 +19,7 @@ Make = Callable[[str], nep.Node]
 
 
 @pytest.fixture(params=["memory", "zeromq"])
-def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Make]:
+def make(request: pytest.FixtureRequest, master: Master, patient: None) -> Iterator[Make]:
     """Factory of nodes on one network; they are closed after the test."""
     made: list[nep.Node] = []
     where = f"blackboard-{next(_names)}" if request.param == "memory" else master.address
@@ -126,7 +126,7 @@ def test_wildcard_watch_stores_values_of_two_publishers(make: Make) -> None:
 def test_change_callbacks_run_in_the_spinning_thread(make: Make) -> None:
     node = make("watcher")
     board = nep.Blackboard(node)
-    board.watch("/touch", key="touched", lives_s=0.2)
+    board.watch("/touch", key="touched", lives_s=2.0)
     seen: list[tuple[str, object, str]] = []
 
     def callback(change: nep.BlackboardChange) -> None:

@@ -293,7 +293,7 @@ def test_reading_parameters_of_a_killed_node_raises(master: Master) -> None:
     """
     with running(code) as program, nep.node("tool") as tool:
         assert program.line() == "there"
-        with tool.parameters_of("robot", timeout_s=5.0) as theirs:
+        with tool.parameters_of("robot", timeout_s=30.0) as theirs:
             assert theirs.get("speed") == 1
             program.process.kill()
             program.process.wait()

@@ -23,7 +23,7 @@ Make = Callable[[str], nep.Node]
 @pytest.fixture(
     params=["zeromq", "memory", "zenoh", "direct", "tcp", pytest.param("sp", marks=pytest.mark.long)]
 )
-def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Make]:
+def make(request: pytest.FixtureRequest, master: Master, patient: None) -> Iterator[Make]:
     """Function that creates nodes in the same network; the nodes are closed after the test.
 
     With "direct", "tcp" and "sp" their servers bind a fixed port, without a master.
@@ -269,7 +269,10 @@ def test_blocking_done_callback_of_a_future_does_not_block_other_calls(make: Mak
     assert future.result(LONG_S) == 1
 
 
-def test_call_without_a_server_raises_no_server_error_with_a_suggestion(registered: Make) -> None:
+def test_call_without_a_server_raises_no_server_error_with_a_suggestion(
+    registered: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("nep.patterns.services.client._SERVICE_QUERY_TIMEOUT_S", LONG_S)
     registered("server").new_server("/arm/move", doubled, threads=1)
     client = registered("client").new_client("/arm/mov")
     with pytest.raises(
@@ -292,7 +295,7 @@ def test_slow_server_raises_service_timeout_and_its_late_reply_is_discarded(make
     go_on.set()
     eventually(lambda: client.late == 1)
     assert client.call({}, timeout_s=LONG_S) == {}
-    assert server.calls == 2
+    assert server.calls + server.refused == 2  # a busy server may have rejected the first as late
 
 
 def test_timed_out_calls_are_not_executed(make: Make, spin) -> None:
@@ -360,9 +363,16 @@ def test_closing_server_finishes_its_running_call(registered: Make) -> None:
     eventually(lambda: len(viewer.graph().services["/x"].servers) == 1)
     go_on.set()
     assert future.result(LONG_S) == "first"
-    assert client.call("next") == "second"
+
+    def is_second() -> bool:
+        try:
+            return client.call("next") == "second"
+        except nep.RequestRefusedError:  # the client isn't notified of the change yet
+            return False
+
+    eventually(is_second)
     closer.join(LONG_S)
-    assert (first.calls, first.errors, first.refused) == (1, 0, 0)
+    assert (first.calls, first.errors) == (1, 0)
 
 
 def test_closing_node_finishes_running_calls_of_its_servers(make: Make) -> None:
@@ -445,6 +455,7 @@ def test_callback_that_calls_its_own_single_threaded_server_times_out(make: Make
     inner = make("inner").new_client("/self", timeout_s=0.3)
     server = node.new_server("/self", lambda deep: inner.call(deep - 1) if deep else "done", threads=1)
     client = make("client").new_client("/self", timeout_s=LONG_S)
+    eventually(lambda: inner.is_connected)
     with pytest.raises(nep.ServiceError, match=r"ServiceTimeoutError: .*0\.3 s.*'/self'"):
         client.call(1)
     assert client.call(0) == "done"
@@ -501,7 +512,7 @@ def test_second_server_raises_an_alert_and_takes_over(registered: Make) -> None:
             return False
 
     eventually(is_second)
-    assert "service:/x" not in {each.id for each in viewer.graph().alerts}
+    eventually(lambda: "service:/x" not in {each.id for each in viewer.graph().alerts})
     assert second.calls >= 1
 
 

@@ -57,7 +57,7 @@ def test_survey_ends_at_its_timeout(node: nep.Node, port: int) -> None:
     at = node.direct("127.0.0.1", port)
     node.new_respondent("/who", lambda _question: go_on.wait(LONG_S) and "late", at, threads=1)
     node.new_respondent("/who", lambda _question: "quick", at, threads=1)
-    surveyor = node.new_surveyor("/who", 300, at)
+    surveyor = node.new_surveyor("/who", 2000, at)
     eventually(lambda: surveyor.respondents == 2)
     assert surveyor.ask({}) == ["quick"]
     go_on.set()

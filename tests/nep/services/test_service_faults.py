@@ -12,7 +12,7 @@ import zmq
 import nep
 from nep.backends.connection import Hybrid
 from nep.masters.master import Master
-from nep.protocol.requests import AddPublisher, NodeRecord, PublisherRecord, derive_id, derive_node_id
+from nep.protocol.requests import AddPublisher, Join, NodeRecord, PublisherRecord, derive_id, derive_node_id
 from nep.protocol.service_wire import topic_of
 from tests.nep.programs import eventually, running
 
@@ -110,10 +110,12 @@ def test_calls_continue_while_the_master_is_unreachable() -> None:
         master.close()
         assert client.call(2) == 2
         with Master(address):
-            eventually(lambda: "/x" in b.graph(LONG_S).services)
-            info = b.graph(LONG_S).services["/x"]
-            eventually(lambda: len(b.graph(LONG_S).services["/x"].clients) == 1)
-            assert info.servers[0].id
+
+            def are_registered() -> bool:
+                info = b.graph(LONG_S).services.get("/x")
+                return info is not None and (len(info.servers), len(info.clients)) == (1, 1)
+
+            eventually(are_registered)
             assert client.call(3) == 3
             assert server.calls == 3
             server.close()
@@ -200,8 +202,10 @@ def test_many_malformed_calls_do_not_block_the_next_valid_call(master: Master) -
     ],
 )
 def test_malformed_or_unmatched_reply_raises_service_timeout(master: Master, client, answer) -> None:
-    with _fake_server(master, lambda parts: [answer]), pytest.raises(nep.ServiceTimeoutError):
-        client.call({}, timeout_s=1.0)
+    with _fake_server(master, lambda parts: [answer]):
+        eventually(lambda: client.is_connected)
+        with pytest.raises(nep.ServiceTimeoutError):
+            client.call({}, timeout_s=1.0)
 
 
 @pytest.mark.parametrize(
@@ -248,7 +252,7 @@ class _fake_server:  # noqa: N801 - it reads as a function
         record = PublisherRecord(
             derive_id(key, 1), topic_of("/x"), "service", "service", (endpoint,), number=1
         )
-        master.submit(AddPublisher(node, record))
+        master.submit(Join(node, 0, (record,), managed=True))  # without a lease
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run, name="fake-server")
 
@@ -316,6 +320,7 @@ def test_ctrl_c_in_a_callback_ends_spin_and_fails_the_call(master: Master) -> No
             future.result(LONG_S)
 
 
+@pytest.mark.usefixtures("patient")
 def test_timers_and_messages_are_handled_between_calls(master: Master) -> None:
     with nep.node("server") as a, nep.node("client") as b:
         ticks, heard = [], []

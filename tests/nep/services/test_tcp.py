@@ -198,6 +198,7 @@ def test_malformed_or_unmatched_plain_tcp_reply_raises_a_nep_error(
 ) -> None:
     with socket.create_server(("127.0.0.1", port)) as listener:
         client = node.new_client("/x", node.direct("127.0.0.1", port, wire="tcp"))
+        eventually(lambda: client.is_connected)
         future = client.call_async({}, timeout_s=1.0 if error is nep.ServiceTimeoutError else LONG_S)
         listener.settimeout(LONG_S)
         connected, _address = listener.accept()

@@ -88,7 +88,9 @@ def test_typed_call_sends_and_returns_instances(make: Make) -> None:
 
 def test_typed_requests_and_replies_are_exchanged_over_msgpack(make: Make) -> None:
     make("server").new_server("/length", length_of, threads=1, request=Way, answer=Length)
-    client = make("client").new_client("/length", msg_type="msgpack", request=Way, answer=Length)
+    client = make("client").new_client(
+        "/length", msg_type="msgpack", request=Way, answer=Length, timeout_s=30.0
+    )
     assert client.call(Way([Point(1), Point(2)])) == Length(1.0, [""])
 
 

@@ -52,7 +52,7 @@ def place() -> str:
 
 
 @pytest.fixture
-def make(place: str) -> Iterator[Make]:
+def make(place: str, patient: None) -> Iterator[Make]:
     made: list[nep.Node] = []
 
     def new(name: str, where: str = place) -> nep.Node:
@@ -121,8 +121,13 @@ def test_calls_succeed_and_server_death_is_reported_through_a_router(make: Make,
         future = client.call_async("hang", timeout_s=None)
         assert program.line() == "asked"
         assert client.call({}) == {"pid": program.process.pid}
-        service = make("viewer", routed).graph().services["/x"]
-        assert (len(service.servers), len(service.clients)) == (1, 1)
+        viewer = make("viewer", routed)
+
+        def is_seen() -> bool:
+            service = viewer.graph().services.get("/x")
+            return service is not None and (len(service.servers), len(service.clients)) == (1, 1)
+
+        eventually(is_seen)
         program.kill()
         with pytest.raises(nep.ServerGoneError):
             future.result(LONG_S)
@@ -232,7 +237,7 @@ def test_survey_reaches_all_respondents(make: Make) -> None:
             "/who", lambda question, said=number: [said, 1 / question], threads=1
         )
     surveyor = make("surveyor").new_surveyor("/who", LONG_S * 1000)
-    assert surveyor.respondents == 3
+    eventually(lambda: surveyor.respondents == 3)
     assert sorted(surveyor.ask(2)) == [[0, 0.5], [1, 0.5], [2, 0.5]]
     assert surveyor.ask(0) == []
     assert surveyor.failures == 3
