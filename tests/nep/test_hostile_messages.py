@@ -64,7 +64,7 @@ def test_echo_shows_every_hostile_message(master, type_in, words):
     payloads = PAYLOADS if words == ("--json",) else SMALL
     with publishing(master.address, "/pose", "json", payloads):
         done = type_in(
-            "topic", "echo", "/pose", *words, "-n", str(len(payloads)), "--timeout", "30",
+            "topic", "echo", "/pose", *words, "-n", str(len(payloads)), "--timeout", "120",
             "--master", master.address,
         )  # fmt: skip
     assert done.returncode == 0

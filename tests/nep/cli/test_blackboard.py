@@ -48,6 +48,7 @@ def started(*arguments: str) -> Iterator[subprocess.Popen[str]]:
         process.communicate()
 
 
+@pytest.mark.usefixtures("patient")
 def test_blackboard_command_watches_topics_and_shows_values(master: Master, run: TypeIn) -> None:
     with started("/blackboard", "human=/perception/humans", "/other/*") as process, nep.node("robot") as node:
         board = node.new_client("blackboard/get", timeout_s=30.0)

@@ -87,7 +87,7 @@ def shown(*words: str, master: str) -> Iterator[Shown]:
 def talking(node: nep.Node) -> Iterator[None]:
     """Publish and log about 300 times a second; check that a subscriber received the first message."""
     pub, ended = node.new_pub("flood"), threading.Event()
-    heard = node.new_sub("flood")
+    heard = node.new_sub("flood", max_messages=10**6)
     node.log.propagate = False  # keeps the log out of the test's output
 
     def talk() -> None:
@@ -122,8 +122,10 @@ def test_command_with_paused_output_does_not_affect_unrelated_topics(
         with node.new_sub("/other") as heard, node.new_pub("/other") as pub:
             pub.publish("still")
             assert heard.listen(LONG_S) == (True, "still")
-        names = [each.name for each in node.graph().nodes.values()]
-        assert any(str(command.process.pid) in name for name in names), "the master still knows it"
+        # The master still knows it.
+        eventually(
+            lambda: any(str(command.process.pid) in each.name for each in node.graph().nodes.values()), LONG_S
+        )
         command.press(GO_ON)
         eventually(lambda: len(command.look()) > before + 1000, LONG_S)
         command.press(INTERRUPT)

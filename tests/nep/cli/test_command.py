@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 import nep
+from tests.nep.programs import GREETINGS_S
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 LONG_S = 60
@@ -24,9 +25,20 @@ def environment():
     return {**os.environ, "PYTHONPATH": str(REPOSITORY), "PYTHONUNBUFFERED": "1", "COLUMNS": "120"}
 
 
+PATIENT = f"""
+import sys
+import nep.backends.base
+nep.backends.base.HANDSHAKE_TIMEOUT_S = {GREETINGS_S}
+sys.argv[0] = "nep"
+from nep.cli import main
+main()
+"""
+
+
 def run(*arguments, given=""):
+    """Run a command, which waits long for handshakes."""
     return subprocess.run(
-        [sys.executable, "-m", "nep", *arguments],
+        [sys.executable, "-c", PATIENT, *arguments],
         input=given,
         capture_output=True,
         encoding="utf-8",
@@ -218,6 +230,7 @@ def test_topic_pub_delivers_the_message(running_master):
         assert [sub.listen(timeout_s=LONG_S)[1] for _ in range(5)] == [7] * 5
 
 
+@pytest.mark.usefixtures("patient")
 def test_topic_pub_uses_the_type_of_the_topic(running_master, type_in):
     with nep.node("listener") as node, node.new_sub("words", "string") as sub:
         assert type_in("topic", "pub", "words", "no JSON at all").returncode == 0

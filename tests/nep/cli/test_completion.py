@@ -16,7 +16,13 @@ from nep.cli.complete import _reachable_master
 from tests.nep.programs import eventually
 
 REPOSITORY = Path(__file__).resolve().parents[3]
-NEP = "import sys; sys.argv[0] = 'nep'; from nep.cli import main; main()"
+NEP = """
+import sys
+from nep.cli import complete, main
+complete._CONNECT_TIMEOUT_S = complete._REPLY_TIMEOUT_S = complete._MESSAGE_TIMEOUT_S = 30.0
+sys.argv[0] = "nep"
+main()
+"""
 
 
 def complete(shell: str, line: str) -> list[str]:

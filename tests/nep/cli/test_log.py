@@ -14,6 +14,8 @@ from nep.cli.graph.log import log
 from nep.nodes.log_handler import LAST_ERRORS_TOPIC, LOG_TOPIC, LOG_TYPE
 from tests.nep.programs import eventually
 
+pytestmark = pytest.mark.usefixtures("patient")
+
 
 @pytest.fixture
 def busy(master):

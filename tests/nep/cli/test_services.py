@@ -105,7 +105,8 @@ def test_call_prints_the_reply(arm, type_in, tmp_path):
     assert json.loads(type_in("service", "call", SERVICE, f"@{file}")[1]) == {"asked": "grüß"}
 
 
-def test_service_command_errors_are_reported_in_one_sentence(arm, type_in, tmp_path):
+def test_service_command_errors_are_reported_in_one_sentence(arm, type_in, tmp_path, monkeypatch):
+    monkeypatch.setattr("nep.patterns.services.client._SERVICE_QUERY_TIMEOUT_S", 30.0)
     for words, sentence in (
         ((SERVICE, '"bad"'), f"the server of '{SERVICE}' failed: LookupError: no such joint"),
         (
@@ -159,7 +160,9 @@ def test_service_names_are_completed(arm, master):
     assert complete_service(Context(), "/leg") == []
 
 
+@pytest.mark.usefixtures("patient")
 def test_services_of_another_back_end_are_listed_and_called(type_in, monkeypatch):
+    monkeypatch.setattr("nep.patterns.services.client._SERVICE_QUERY_TIMEOUT_S", 30.0)
     monkeypatch.setenv("NEP_MASTER", "127.0.0.1:1")  # an address of another back end is ignored
     monkeypatch.setenv("NEP_ZENOH_CONFIG", place_for("zenoh", ""))
     place = place_for("zenoh", "")

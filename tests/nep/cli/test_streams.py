@@ -18,7 +18,7 @@ from nep.protocol.graph_view import Alert
 from nep.system.streams import command_line_arguments
 
 REPOSITORY = Path(__file__).resolve().parents[3]
-LONG_S = 60
+LONG_S = 140
 CODE_PAGES = ("cp1252", "cp437", "ascii", "latin-1")
 NASTY = "😀 \u2013 “two” → \x1b[2J \x9b2J \u202e Grüße 日本"
 TOPIC = "/Größe\u2013“😀”"

@@ -106,6 +106,7 @@ def test_alarm_saves_the_last_seconds_through_a_flight_recorder_if_one_is_runnin
     assert told[1] == "nothing saved: 'nep recording ring' isn't running"
 
 
+@pytest.mark.usefixtures("patient")
 def test_message_is_published_and_a_misspelt_topic_reported(master, type_in, file) -> None:
     name = file(
         {"when": BELOW, "do": [{"send": "/say", "message": {"say": "near"}}]},
@@ -113,7 +114,7 @@ def test_message_is_published_and_a_misspelt_topic_reported(master, type_in, fil
     )
     with Talker(master.address, "/distance", {"range": 0.3}) as node, node.new_sub("/say", "json") as heard:
         done = type_in("watch", name, "-n", "1", "--master", master.address)
-        assert heard.listen(timeout_s=5.0) == (True, {"say": "near"})
+        assert heard.listen(timeout_s=30.0) == (True, {"say": "near"})
     assert "'/distanse' doesn't exist yet; did you mean '/distance'?" in done.stderr
     assert "sent to /say" in done.stdout
 
@@ -127,7 +128,8 @@ def describe(robot: nep.Node, command: str) -> list[object]:
     return told
 
 
-def test_alarm_moves_no_robot_that_was_not_allowed(master, type_in, file) -> None:
+def test_alarm_moves_no_robot_that_was_not_allowed(master, type_in, file, monkeypatch) -> None:
+    monkeypatch.setattr("nep.cli.programs.watch._ROBOT_DISCOVERY_S", 60.0)
     name = file({"when": BELOW, "do": [{"send": "/orders", "message": {"op": "invoke"}}]})
     words = ("watch", name, "-n", "1", "--master", master.address)
     with nep.node("rover", master=master.address) as robot, Talker(master.address, "/distance", {"range": 0}):

@@ -178,7 +178,7 @@ def test_text_output_has_a_sentence_and_the_next_step(foreign):
         [sys.executable, "-m", "nep", "doctor", "--master", f"127.0.0.1:{foreign}"],
         capture_output=True,
         encoding="utf-8",
-        timeout=30,
+        timeout=120,
         check=False,
         env={**os.environ, "PYTHONPATH": str(REPOSITORY), "PYTHONIOENCODING": "utf-8"},
     )

@@ -67,6 +67,9 @@ def test_record_command_writes_a_complete_private_file_when_interrupted(master, 
         assert "press Ctrl+C to stop" in child.stderr.readline()
         for n in range(50):
             publisher.publish({"n": n})
+        eventually(
+            lambda: [each.received for each in robot.graph().patterns["/arm/*"].subscribers] == [50], 60.0
+        )
         eventually(lambda: path.exists() and path.stat().st_size > 500)
         child.send_signal(getattr(signal, name))
         _out, err = child.communicate(timeout=60)
@@ -176,6 +179,7 @@ def test_export_command_writes_to_the_output_folder_and_rejects_invalid_options(
             run("recording", "export", path, "-o", tmp_path / "out", *wrong)
 
 
+@pytest.mark.usefixtures("patient")
 def test_play_command_publishes_only_the_named_topics(path, master, capfd):
     with nep.node("hears", master=master.address) as node:
         heard: list[nep.Message] = []
@@ -248,7 +252,11 @@ def describe(robot: nep.Node, name: str, command: str) -> list[nep.Message]:
     return told
 
 
-def test_play_command_does_not_move_a_connected_robot_without_permission(master, tmp_path, capfd):
+@pytest.mark.usefixtures("patient")
+def test_play_command_does_not_move_a_connected_robot_without_permission(
+    master, tmp_path, capfd, monkeypatch
+):
+    monkeypatch.setattr("nep.cli.recordings.play._ROBOT_DISCOVERY_S", 60.0)
     path = tmp_path / "Drive.mcap"
     record(path, [[json_message(1, topic="/Rover/drive"), json_message(2, topic="/weather")]])
     words = ("play", path, "--master", master.address, "--speed", 10)
@@ -268,6 +276,7 @@ def test_play_command_does_not_move_a_connected_robot_without_permission(master,
         eventually(lambda: len(told) == 2)
 
 
+@pytest.mark.usefixtures("patient")
 def test_play_command_stops_publishing_a_topic_when_a_robot_moved_by_the_topic_connects(
     master, tmp_path, capfd
 ):

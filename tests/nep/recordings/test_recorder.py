@@ -100,6 +100,7 @@ def test_each_message_is_recorded_once_including_the_first_of_later_topics(make)
     assert 99 not in heard.of("/arm/joints")
 
 
+@pytest.mark.usefixtures("patient")
 def test_robot_descriptions_and_alerts_are_recorded_for_any_selection(master):
     heard = Heard()
     with (
@@ -117,6 +118,7 @@ def test_robot_descriptions_and_alerts_are_recorded_for_any_selection(master):
         assert {each.topic for each in heard.messages} == {"/pepper/description"}
 
 
+@pytest.mark.usefixtures("patient")
 def test_recorded_messages_equal_received_messages_byte_for_byte(master, tmp_path):
     path = tmp_path / "a.mcap"
     with (
@@ -153,6 +155,7 @@ def test_recorded_messages_equal_received_messages_byte_for_byte(master, tmp_pat
     assert {(each.received, each.lost, each.late) for each in figures.values()} == {(10, 0, 0)}
 
 
+@pytest.mark.usefixtures("patient")
 def test_recorder_service_records_and_keeps_on_command_and_rejects_malformed_commands(master, tmp_path):
     events: list[dict[str, object]] = []
 
@@ -173,7 +176,11 @@ def test_recorder_service_records_and_keeps_on_command_and_rejects_malformed_com
         order(op="record", path=str(tmp_path / "b.mcap"))
         for n in range(5):
             publisher.publish({"n": n})
-        until(lambda: any((each["recording"] or {}).get("topics") for each in seen("figures")))
+
+        def counts(part: str) -> list[int]:
+            return [each[part]["message_count"] for each in seen("figures") if each[part]]
+
+        until(lambda: 5 in counts("recording") and 5 in counts("ring"))
         order(op="note", text="it fell")
         order(op="say", role="runs", value={"id": "1", "name": "Greeting"})
         order(op="say", role="alarms", value={"id": "2"}, to="ring")
@@ -214,6 +221,7 @@ def test_recorder_service_records_and_keeps_on_command_and_rejects_malformed_com
 
 
 @pytest.mark.parametrize(("limit", "ends"), [("time", {"seconds": 5}), ("size", {"size_bytes": 1000})])
+@pytest.mark.usefixtures("patient")
 def test_recording_stops_at_its_duration_or_size_limit(master, tmp_path, limit, ends):
     events: list[dict[str, object]] = []
     now = [100.0]
@@ -309,6 +317,7 @@ def test_recorder_process_finishes_on_end_of_input_or_termination_signal(master,
         child.stdin.write(json.dumps({"op": "record", "path": str(path)}).encode() + b"\n")
         child.stdin.flush()
         assert json.loads(child.stdout.readline())["event"] == "recording"
+        until(lambda: publisher.subscribers)
         for n in range(100):
             publisher.publish({"n": n})
         while True:
