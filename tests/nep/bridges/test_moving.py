@@ -30,7 +30,7 @@ def test_bridge_blocks_messages_that_move_a_robot_under_another_topic_name(direc
         names = ("/innocent", "/orders") if direction == "a->b" else ("/orders", "/innocent")
         with Bridge(configured(a, b, topic(*names, direction)), allow_moving=()) as bridge:
             assert bridge.wait_until_ready(30.0)
-            assert bridge.denial_reasons(5.0) == ()
+            assert bridge.denial_reasons(60.0) == ()
             carried = route(bridge, direction[0], "/innocent")
             says, hears = near.node("says").new_pub("/innocent"), far.node("hears").new_sub("/orders")
             eventually(lambda: says.subscribers)
@@ -59,7 +59,8 @@ def test_bridge_forwards_to_an_allowed_robot_and_patterns_match_no_other_robot()
             assert other.received == 0
 
 
-def test_command_rejects_topics_that_move_a_robot_unless_allowed(type_in, tmp_path):
+def test_command_rejects_topics_that_move_a_robot_unless_allowed(type_in, tmp_path, monkeypatch):
+    monkeypatch.setattr("nep.cli.programs.bridge._ROBOT_DISCOVERY_S", 60.0)
     with nets("nanomsg", "zeromq") as (a, b):
 
         def bridge(target: str, *words: str, msg_type: str = "json"):

@@ -25,7 +25,7 @@ def test_posted_messages_are_returned_in_order_and_wake_the_reader(inbox):
     first, second = message(), message()
     poster = threading.Thread(target=lambda: (inbox.post(first), inbox.post(second)))
     poster.start()
-    assert select.select([inbox], [], [], 5)[0]
+    assert select.select([inbox], [], [], 60)[0]
     poster.join()
     assert inbox.pop_all() == [first, second]
     assert not select.select([inbox], [], [], 0)[0]

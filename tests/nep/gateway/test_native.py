@@ -26,7 +26,7 @@ class Scene:
 
     def _node(self):
         self.made += 1
-        return nep.Node("gateway", master=self.address, generation="gateway", wait_s=0.3)
+        return nep.Node("gateway", master=self.address, generation="gateway", wait_s=60.0)
 
     def _report(self, alerts):
         self.alerts = alerts
@@ -37,7 +37,7 @@ class Scene:
 
 
 @pytest.fixture
-def scene(master):
+def scene(master, patient):
     made = Scene(master)
     yield made
     made.close()

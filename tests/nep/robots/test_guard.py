@@ -32,11 +32,11 @@ def describe(robot: nep.Node, name: str, command: str) -> None:
 
 def test_later_robot_is_protected_on_every_topic_of_its_description(network: str, node: nep.Node) -> None:
     guard = MotionGuard(node)
-    assert guard.wait_for_descriptions(1.0)
+    assert guard.wait_for_descriptions(30.0)
     assert guard.denial_reason("/orders") == ""
     with nep.node("robot", "memory", master=network) as robot:
         describe(robot, "Rover", "/orders")
-        guard.wait_for_descriptions(5.0)
+        guard.wait_for_descriptions(30.0)
         said = guard.denial_reason("/orders")
         assert "Rover" in said
         assert "--allow-moving Rover" in said  # its claim to be virtual is not trusted
@@ -54,7 +54,7 @@ def test_allowed_robots_and_topics_are_not_denied(network: str, node: nep.Node) 
         describe(robot, "Rover", "/orders")
         describe(robot, "Fido", "/orders")
         guard = MotionGuard(node, ["Rover"])
-        assert guard.wait_for_descriptions(5.0)
+        assert guard.wait_for_descriptions(30.0)
         assert guard.denial_reason("/orders").count("--allow-moving") == 1
         assert "--allow-moving Fido" in guard.denial_reason("/orders")
         assert MotionGuard(node, ["/new"]).denial_reason("/new", "robot/command") == ""
@@ -89,7 +89,7 @@ def test_hostile_descriptions_do_not_stop_the_guard_or_reduce_protection(
     with nep.node("robot", "memory", master=network) as robot, nep.node("x", "memory", master=network) as x:
         describe(robot, "Rover", "/orders")
         guard = MotionGuard(node)
-        assert guard.wait_for_descriptions(5.0)
+        assert guard.wait_for_descriptions(30.0)
         strange = x.new_pub("/Rover/description", "robot/description", latched=True)
         for payload in HOSTILE:
             strange.publish(payload)

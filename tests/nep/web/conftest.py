@@ -15,7 +15,7 @@ from nep.programs.web import WebServer, WebSettings
 
 
 @pytest.fixture
-def node(master: Master) -> Iterator[nep.Node]:
+def node(master: Master, patient: None) -> Iterator[nep.Node]:
     """Python node that exchanges messages with pages."""
     with nep.node("python", master=master.address) as node:
         yield node

@@ -85,6 +85,7 @@ def test_robots_are_allowed_and_denied_while_a_page_is_connected(
     description = {"title": "Rover", "rb:topics": {"command": "/orders"}}
     orders = node.new_sub("/orders")
     node.new_pub("/Rover/description", "robot/description", latched=True).publish(description)
+    eventually(lambda: server._guard.denial_reason("/orders") != "")
     assert "Rover" in page.refusal("publish", topic="/orders", msg=1)
     page.refusal("publish", topic="/orders", msg=2)
     (refused,) = server.rejections  # at most one entry in ten seconds
@@ -154,7 +155,13 @@ def test_rate_limit_rate_and_message_count_are_reported_for_each_topic_of_a_page
     reads, publishes = server.pages[0].topics
     assert (reads.topic, reads.is_published, reads.max_rate_hz) == ("/odom", False, 10)
     assert (publishes.topic, publishes.is_published, publishes.max_rate_hz) == ("/buttons", True, None)
-    eventually(lambda: all(each.rate_hz > 0 and each.bytes_per_s > 10 for each in server.pages[0].topics))
+
+    def are_measured() -> bool:  # a rate is that of the last two seconds
+        odom.publish({"x": 1})
+        page.send("publish", topic="/buttons", msg={"pressed": True})
+        return all(each.rate_hz > 0 and each.bytes_per_s > 10 for each in server.pages[0].topics)
+
+    eventually(are_measured)
     assert server.pages[0].published_topics == ("/buttons",)
 
 

@@ -275,8 +275,8 @@ def test_token_is_required_if_configured(master: Master) -> None:
             with pytest.raises(ConnectionClosed) as closed:
                 locked.recv(30.0)
             assert closed.value.rcvd.code == 1008
-        now = int(time.time())
         with connect(server.url) as unlocked:
+            now = int(time.time())
             auth = signed(token, now, now + 60)
             Peer(unlocked).send(
                 "auth", mac=auth.mac, client=auth.client, dest=auth.dest, rand=auth.rand, t=auth.time_s,
