@@ -23,7 +23,7 @@ JSON = Path("/usr/lib/cli/Newtonsoft.Json-5.0/Newtonsoft.Json.dll")
 COMPILE = ("mcs", "-langversion:7", "-warnaserror", "-nowarn:0649,0169", "-debug-")
 HAS_MONO = sys.platform != "win32" and bool(shutil.which("mcs") and shutil.which("mono") and JSON.exists())
 WITHOUT = "mono-mcs, mono-runtime or libnewtonsoft-json5.0-cil is missing: the C# client is not tested"
-_LINE_S = 20.0
+_LINE_S = 60.0
 
 
 def sources(folder: str) -> list[Path]:

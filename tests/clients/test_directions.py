@@ -27,7 +27,7 @@ pytestmark = [
 ]
 LANGUAGES = ("python", "javascript", "csharp")
 COUNT = 40
-LONG_S = 30.0
+LONG_S = 60.0
 
 PYTHON = r"""
 import json, sys, nep
@@ -120,7 +120,7 @@ def commands(tmp_path: Path) -> dict[str, list[str]]:
 
 
 @pytest.fixture
-def python(master: Master) -> Iterator[nep.node]:
+def python(master: Master, patient: None) -> Iterator[nep.node]:
     with nep.node("python") as own:
         yield own
 
