@@ -22,7 +22,7 @@ from nep.backends.zeromq.shared import memory as shared_memory
 from nep.backends.zeromq.shared.memory import MIN_SHARED_BYTES, SharedReader, SharedWriter
 from nep.masters.master import Master
 from nep.protocol import wire
-from tests.nep.programs import eventually, running
+from tests.nep.programs import Program, eventually, running
 
 pytest.importorskip("iceoryx2", reason="shared memory needs iceoryx2, which this computer has no package of")
 LARGE = 300_000
@@ -371,24 +371,26 @@ def test_memory_files_of_a_killed_publisher_are_deleted_by_the_next_program() ->
         print("sent")
         sys.stdin.readline()
     """
-    before = set(_files())
     with running(code, str(next(_ids))) as program:
         assert program.line() == "sent"
-        made = set(_files()) - before
+        made = _files(program)
         assert made
         program.kill()
-    assert made <= set(_files())
+    assert all(each.exists() for each in made)
     with running(code, str(next(_ids))) as another:
         assert another.line() == "sent"
-        assert not made & set(_files())
+        assert not any(each.exists() for each in made)
+        made = _files(another)
+        assert made
         another.say("end")
         another.end()
-    assert set(_files()) <= before
+    assert not any(each.exists() for each in made)
 
 
-def _files() -> list[str]:
-    """Return the names of nep's shared memory files on this computer, without the global one."""
-    return [each.name for each in Path(_MEMORY).glob("nep_*") if "global" not in each.name]
+def _files(program: Program) -> set[Path]:
+    """Return nep's shared memory files that a program uses, without the global one."""
+    words = Path(f"/proc/{program.process.pid}/maps").read_text().split()
+    return {Path(each) for each in words if each.startswith(f"{_MEMORY}/nep_") and "global" not in each}
 
 
 def test_slots_of_a_killed_reader_are_released() -> None:
