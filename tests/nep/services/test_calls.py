@@ -258,11 +258,17 @@ def test_future_of_a_call_can_be_cancelled(make: Make) -> None:
 
 
 def test_blocking_done_callback_of_a_future_does_not_block_other_calls(make: Make) -> None:
-    make("server").new_server("/echo", lambda request: request, threads=1)
+    is_added, go_on = threading.Event(), threading.Event()
+
+    def echo(request: object) -> object:
+        is_added.wait(LONG_S)  # a callback that is added later is called in this thread
+        return request
+
+    make("server").new_server("/echo", echo, threads=1)
     client, other = (make(name).new_client("/echo", timeout_s=LONG_S) for name in ("a", "b"))
-    go_on = threading.Event()
     future: Future[object] = client.call_async(1)
     future.add_done_callback(lambda _ended: go_on.wait(LONG_S))
+    is_added.set()
     assert other.call(2) == 2
     assert client.call(3) == 3
     go_on.set()
