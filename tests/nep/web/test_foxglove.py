@@ -149,8 +149,8 @@ def test_client_moves_a_robot_only_after_it_is_allowed(foxglove: WebServer, node
     description = {"title": "Rover", "rb:topics": {"command": "/orders"}}
     orders = node.new_sub("/orders")
     node.new_pub("/Rover/description", "robot/description", latched=True).publish(description)
-    eventually(lambda: foxglove._guard.denial_reason("/orders") != "")
     with opened(foxglove) as client:
+        eventually(lambda: foxglove._guard.denial_reason("/orders") != "")
         advertise(client, 1, "/orders", "")
         assert "--allow-moving Rover" in str(received(client, "status")["message"])
         publish(client, 1, {"op": "invoke"})
