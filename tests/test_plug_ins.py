@@ -161,7 +161,9 @@ def test_variable_cannot_have_the_name_of_a_function_of_a_category(write: Write)
     assert "weight_on_moon" in reserved_names()
 
 
-def test_robot_plug_in_is_described_driven_and_offered_as_blocks(write: Write, master: Master) -> None:
+def test_robot_plug_in_is_described_driven_and_offered_as_blocks(
+    write: Write, master: Master, patient: None
+) -> None:
     module = write(
         "app.robots",
         "lamp",
