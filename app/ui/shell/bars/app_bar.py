@@ -43,9 +43,16 @@ class AppBar(QWidget):
 
     layout_selected = Signal(str)
 
-    def __init__(self, theme: Theme, layouts: Sequence[Layout], platform: str = sys.platform) -> None:
+    def __init__(
+        self,
+        theme: Theme,
+        layouts: Sequence[Layout],
+        platform: str = sys.platform,
+        *,
+        parent: QWidget | None = None,
+    ) -> None:
         # `platform` is a value of `sys.platform`.
-        super().__init__()
+        super().__init__(parent)
         self._theme = theme
         self.setMinimumHeight(theme.size("appBar"))
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)

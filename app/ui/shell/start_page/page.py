@@ -121,8 +121,8 @@ class StartPage(QWidget):
     work_selected = Signal(str)
     exited = Signal()  # Esc was pressed
 
-    def __init__(self, theme: Theme, examples: Sequence[Example]) -> None:
-        super().__init__()
+    def __init__(self, theme: Theme, examples: Sequence[Example], parent: QWidget | None = None) -> None:
+        super().__init__(parent)
         self._theme, self.examples = theme, tuple(examples)
         self.setAccessibleName(_("Start"))
         self.open_work = OpenWorkList(theme)
@@ -221,7 +221,6 @@ class StartPage(QWidget):
         area = self._area = QScrollArea()
         area.setWidgetResizable(True)
         area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        area.setWidget(middle)
         area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         area.viewport().setAutoFillBackground(False)
         line = DevelopersLine(self._theme)
@@ -231,6 +230,7 @@ class StartPage(QWidget):
         column.setSpacing(0)
         column.addWidget(area, 1)
         column.addWidget(line)
+        area.setWidget(middle)  # the last step, because it styles the contents
 
     def banner_area(self) -> QRect:
         """Return the area for an alert, above the heading of the page."""
