@@ -263,11 +263,11 @@ class PanelWidget(QWidget):
             The stack.
         """
         stack = QStackedWidget()
-        for page in pages:
-            stack.addWidget(page)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(stack)
+        for page in pages:
+            stack.addWidget(page)
         return stack
 
     def title(self) -> str:

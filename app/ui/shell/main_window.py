@@ -146,7 +146,7 @@ class MainWindow(QMainWindow):
         self.use_robot.allow_shrinking()
         self.tool_bar.add_tool(self.use_robot)
         self.banner = AlertBanner(theme)
-        # Widgets get their parents early: Qt styles a widget with all its children again when the parent changes.
+        # parents first, because Qt styles a widget and its children again when the parent changes
         self.middle = middle = QWidget(self)
         self.pages = QStackedWidget(middle)
         self.start = StartPage(theme, examples, self.pages)
@@ -295,7 +295,7 @@ class MainWindow(QMainWindow):
         # Uses the workbench created in advance, if any.
         bench = self._prepared_benches.get(layout.name)
         if bench is None:
-            bench = Workbench(self.theme, layout, self.panels, self.context)
+            bench = Workbench(self.theme, layout, self.panels, self.context, self.pages)
             bench.panel_failed.connect(self._panel_failed)
         return bench
 

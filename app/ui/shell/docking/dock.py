@@ -67,8 +67,8 @@ class _Corner(QWidget):
 class DockBody(QWidget):
     """Lower part of the frame, with the panel or, after a failure, an error message."""
 
-    def __init__(self, theme: Theme, panel: PanelWidget) -> None:
-        super().__init__()
+    def __init__(self, theme: Theme, panel: PanelWidget, parent: QWidget) -> None:
+        super().__init__(parent)
         self._theme = theme
         column = QVBoxLayout(self)
         column.setContentsMargins(1, 0, 1, 1)
@@ -167,10 +167,17 @@ class Dock(QDockWidget):
     closed = Signal(str)
 
     def __init__(
-        self, theme: Theme, description: Panel, panel: PanelWidget, density: Density, number: int = 1
+        self,
+        theme: Theme,
+        description: Panel,
+        panel: PanelWidget,
+        density: Density,
+        number: int = 1,
+        parent: QWidget | None = None,
     ) -> None:
         # `number` distinguishes docks of the same kind; `key` is the unique name in a workbench.
-        super().__init__(numbered_title(_(description.title), number))
+        # The parent is set early, because Qt styles a widget and its children again when it changes.
+        super().__init__(numbered_title(_(description.title), number), parent)
         self.description, self.panel = description, panel
         self.number, self.key = number, format_key(description.name, number)
         self.has_failed = False
@@ -185,7 +192,8 @@ class Dock(QDockWidget):
 
     def _set_panel(self, panel: PanelWidget) -> None:
         panel.set_number(self.number)
-        title, body = DockTitle(self._theme, panel, self._density), DockBody(self._theme, panel)
+        title = DockTitle(self._theme, panel, self._density, self)
+        body = DockBody(self._theme, panel, self)
         panel.set_density(self._density)
         panel.setFont(panel.text_font())
         title.menu_requested.connect(self._show_menu)
@@ -400,14 +408,20 @@ def parse_key(key: str) -> tuple[str, int]:
     return key, 1
 
 
-def create_dock(description: Panel, context: PanelContext, density: Density, number: int = 1) -> Dock:
+def create_dock(
+    description: Panel,
+    context: PanelContext,
+    density: Density,
+    number: int = 1,
+    parent: QWidget | None = None,
+) -> Dock:
     """Return a dock with a new panel, or with a `FailedPanel` if the panel raises an exception."""
     try:
-        return Dock(context.theme, description, description.make(context), density, number)
+        return Dock(context.theme, description, description.make(context), density, number, parent)
     except CAUGHT_ERRORS as error:
         traceback.clear_frames(error.__traceback__)
         failed_panel = FailedPanel(context, description, error)
-    dock = Dock(context.theme, description, failed_panel, density, number)
+    dock = Dock(context.theme, description, failed_panel, density, number, parent)
     failed_panel.on_created = dock.replace
     return dock
 

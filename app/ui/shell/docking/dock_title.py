@@ -115,8 +115,10 @@ class DockTitle(QWidget):
 
     menu_requested = Signal(object)
 
-    def __init__(self, theme: Theme, panel: PanelWidget, density: Density) -> None:
-        super().__init__()
+    def __init__(
+        self, theme: Theme, panel: PanelWidget, density: Density, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
         self._theme, self._panel, self._density = theme, panel, density
         self._min_height = theme.size("panelTitle", density)  # cached, because layouts read it often
         self._title_widget = panel.title_widget()

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from PySide6.QtCore import QByteArray, QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QHideEvent, QMouseEvent, QResizeEvent, QShowEvent
-from PySide6.QtWidgets import QApplication, QMainWindow
+from PySide6.QtWidgets import QApplication, QMainWindow, QWidget
 
 from app.ui.panels.base import Panel, PanelContext, PanelWidget, numbered_title
 from app.ui.shell.docking.dock import Dock, create_dock, format_key, parse_key
@@ -45,8 +45,9 @@ class Workbench(QMainWindow):
         layout: Layout,
         panels: Mapping[str, Panel],
         context: PanelContext,
+        parent: QWidget | None = None,
     ) -> None:
-        super().__init__()
+        super().__init__(parent)
         self._theme, self._panels, self._context = theme, panels, context
         self._layout = arranged(layout, panels.values())
         self.docks: dict[str, Dock] = {}
@@ -87,7 +88,9 @@ class Workbench(QMainWindow):
         """Create a panel in advance to avoid a delay when it is opened. The panel is suspended until then."""
         description = self._panels.get(name)
         if description is not None and name not in self.docks and name not in self._prepared_docks:
-            self._prepared_docks[name] = dock = create_dock(description, self._context, self._layout.density)
+            self._prepared_docks[name] = dock = create_dock(
+                description, self._context, self._layout.density, parent=self
+            )
             dock.update_suspension(0.0)
 
     def reset_layout(self) -> None:
@@ -197,7 +200,7 @@ class Workbench(QMainWindow):
         if description is None or number > (MAX_PANELS_PER_KIND if description.allows_multiple else 1):
             return None
         dock = self._prepared_docks.pop(key, None)
-        dock = dock or create_dock(description, self._context, self._layout.density, number)
+        dock = dock or create_dock(description, self._context, self._layout.density, number, self)
         dock.another_requested.connect(self.open_another)
         dock.closed.connect(self._on_dock_closed)
         dock.dockLocationChanged.connect(self._schedule_tabs)
