@@ -55,11 +55,21 @@ def _suggestion(name: str) -> str:
     return f" (did you mean '{matches[0]}'?)" if matches else ""
 
 
+def icon_svg(name: str, colour: str, size_px: float = 0) -> str:
+    """Return an icon as SVG.
+
+    Args:
+        name: Name of the icon.
+        colour: Colour of the lines, as ``#RRGGBB``.
+        size_px: Displayed size, which determines the width of the lines.
+    """
+    text = _source(name).replace("currentColor", colour)
+    return text if size_px < MIN_THIN_SIZE_PX else text.replace('stroke-width="2"', 'stroke-width="1.75"')
+
+
 @lru_cache(maxsize=512)
 def _renderer(name: str, colour: str, opacity: float, is_filled: bool, is_thin: bool) -> QSvgRenderer:
-    text = _source(name).replace("currentColor", colour)
-    if is_thin:
-        text = text.replace('stroke-width="2"', 'stroke-width="1.75"')
+    text = icon_svg(name, colour, MIN_THIN_SIZE_PX if is_thin else 0)
     if is_filled:
         text = text.replace('fill="none"', f'fill="{colour}"', 1)
     if opacity < 1:

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Literal, NamedTuple, Protocol
 
+from app.ui.theme.icons import icon_svg
+from app.ui.theme.style_images import image_url
 from app.ui.theme.tokens import TextKind
 
 LABEL_ROLES = (
@@ -18,6 +20,14 @@ LABEL_ROLES = (
 
 EXTRA_KINDS = {"titleLarge": (14.0, 600), "empty": (17.0, 600), "card": (15.0, 600), "lead": (15.0, 400)}
 """Size in px and weight of kinds of labels that the tokens don't define."""
+
+
+CHECK_BOX_SIDE = 18  # px at 100 %
+SWITCH_WIDTH = 36
+SWITCH = (
+    '<svg xmlns="http://www.w3.org/2000/svg" width="34" height="18"><circle cx="{x}" cy="9" r="7"'
+    ' fill="{colour}"/></svg>'
+)
 
 
 class ButtonColours(NamedTuple):
@@ -125,6 +135,43 @@ IconButton:hover {{ background: {hover}; }}
 IconButton:pressed {{ background: {pressed}; }}
 IconButton:checked {{ background: {accentTint}; }}
 IconButton[dropTarget="true"] {{ background: {accentTint}; border: 2px solid {accent}; }}
+
+CheckBox {{ spacing: 8px; margin-left: 1px; outline: none; }}
+CheckBox:disabled {{ color: {textDisabled}; }}
+CheckBox::indicator {{
+    width: {check_side}px; height: {check_side}px; padding: 1px; border: 1px solid {controlBorder};
+    border-radius: {key}px; background: {field};
+}}
+CheckBox::indicator:hover, CheckBox::indicator:pressed {{ background: {hover}; }}
+CheckBox::indicator:checked {{ background: {accent}; border-color: {accent}; image: url({check_image}); }}
+Switch {{ spacing: 10px; margin: 0; font-size: {switch_text}px; }}
+Switch::indicator, Switch::indicator:checked:disabled {{
+    width: 34px; height: 18px; padding: 0; border: 1px solid {controlBorder}; border-radius: 10px;
+    background: {sunken};
+}}
+Switch::indicator {{ image: url({switch_off_image}); }}
+Switch::indicator:hover, Switch::indicator:pressed {{ background: {sunken}; }}
+Switch::indicator:checked {{ image: url({switch_on_image}); background: {accent}; }}
+
+ComboBox {{
+    background: {field}; color: {text}; border: 1px solid {controlBorder}; border-radius: {control}px;
+    padding: 0 9px;
+}}
+ComboBox:hover {{ background: {hover}; }}
+ComboBox:disabled {{ color: {textDisabled}; }}
+ComboBox::drop-down {{ subcontrol-origin: content; border: none; width: 16px; padding-left: 2px; }}
+ComboBox::down-arrow {{ image: url({combo_image}); width: 16px; height: 16px; }}
+
+SliderTrack::groove, SliderTrack::sub-page {{
+    height: {track}px; margin: 0 {track_margin}px; border-radius: {track_radius}px; background: {borderStrong};
+}}
+SliderTrack::sub-page {{ background: {accent}; }}
+SliderTrack::handle {{
+    width: {handle}px; height: {handle}px; margin: -{track_margin}px; border: 2px solid {accent};
+    border-radius: {handle_radius}px; background: {panel};
+}}
+SliderTrack::sub-page:disabled {{ background: {textDisabled}; }}
+SliderTrack::handle:disabled {{ border-color: {textDisabled}; }}
 
 Card {{ background: {panel}; border: 1px solid {border}; border-radius: {card}px; }}
 Card[sunken="true"] {{ background: {sunken}; }}
@@ -262,6 +309,8 @@ class _Roles(dict[str, str]):
 def build(theme: ThemeValues) -> str:
     """Return the style sheet for a theme."""
     roles = _Roles(theme)
+    check_side = theme.scaled(CHECK_BOX_SIDE) - 4  # without padding and border
+    track, handle = theme.size("sliderTrack"), theme.size("sliderHandle")
     has_border = theme.is_dark or theme.is_high_contrast
     roles.update(
         small=str(theme.radius("small")),
@@ -272,6 +321,17 @@ def build(theme: ThemeValues) -> str:
         segments_border=f"1px solid {theme.hex('border')}" if has_border else "none",
         field=theme.hex("sunken") if theme.is_dark else theme.hex("panel"),
         menu_button_padding=str(round(theme.scaled(14)) + 9),
+        combo_image=image_url(icon_svg("chevron-down", theme.hex("textSecondary"))),
+        track=str(track),
+        track_radius=str(track // 2),
+        track_margin=str((handle - track) // 2),
+        handle=str(handle - 4),  # without border
+        handle_radius=str(handle // 2),
+        check_side=str(round(check_side)),
+        check_image=image_url(icon_svg("check", theme.hex("onAccent"), check_side)),
+        switch_off_image=image_url(SWITCH.format(x=9, colour=theme.hex("controlBorder"))),
+        switch_on_image=image_url(SWITCH.format(x=25, colour=theme.hex("onAccent"))),
+        switch_text=str(round(theme.scaled(theme.text_kinds()["bodyLarge"].size_px))),
         small_text=str(round(theme.scaled(theme.text_kinds()["small"].size_px))),
     )
     return _button_rules(theme) + STYLE_SHEET_TEMPLATE.format_map(roles) + _label_rules(theme)

@@ -1,46 +1,58 @@
-"""Painted check box with a label."""
+"""Check box with a label. The style sheet paints it."""
 
 from __future__ import annotations
 
-from PySide6.QtCore import QRectF, QSize
-from PySide6.QtGui import QPainter
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QKeyEvent, QResizeEvent
+from PySide6.QtWidgets import QCheckBox, QStyle, QStyleOptionButton
 
-from app.ui.theme.icons import paint_icon
+from app.ui.theme.style_sheet import CHECK_BOX_SIDE
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
-from app.ui.widgets.buttons import PaintedButton
-
-SIDE, GAP, MIN_HEIGHT = 18, 8, 26
+from app.ui.widgets.buttons import click_on_enter, set_up_button
 
 
-class CheckBox(PaintedButton):
-    """Check box with a label."""
+class CheckBox(QCheckBox):
+    """Check box with a label. A text that doesn't fit is elided and shown as tooltip."""
 
-    elides_text = True
+    text_kind, gap, min_height, padding = "body", 8, 26, 6
 
     def __init__(self, theme: Theme, text: str, is_checked: bool = False) -> None:
-        super().__init__(theme, text, checkable=True)
+        super().__init__()
+        self._theme = theme
+        self.set_text(text)
         self.setChecked(is_checked)
+        set_up_button(self, theme, "small")
+
+    def set_text(self, text: str) -> None:
+        """Set the text, which is also the accessible name."""
+        self.setText(text)
+        self.setAccessibleName(text)
+
+    def box_width(self) -> float:
+        """Return the width in px of the box with its margin."""
+        return self._theme.scaled(CHECK_BOX_SIDE) + 1
 
     def sizeHint(self) -> QSize:
-        font = self._theme.font("body")
-        width = self._theme.scaled(SIDE) + GAP + paint.width_of(font, self.text()) + 4
-        return QSize(round(width) + 1, max(MIN_HEIGHT, round(paint.height_of(font)) + 6))
+        font = self._theme.font(self.text_kind)
+        text_width = self.gap + paint.width_of(font, self.text()) if self.text() else 0
+        height = max(self.min_height, round(paint.height_of(font)) + self.padding)
+        return QSize(round(self.box_width() + text_width) + 2, height)
 
     def minimumSizeHint(self) -> QSize:
         preferred = self.sizeHint()
         return QSize(min(round(self._theme.scaled(72)), preferred.width()), preferred.height())
 
-    def paint_button(self, painter: QPainter, rect: QRectF) -> None:
-        theme, side = self._theme, self._theme.scaled(SIDE)
-        box_rect = QRectF(1, rect.center().y() - side / 2, side, side)
-        if self.isChecked():
-            paint.box(painter, box_rect, theme.radius("key"), theme.colour("accent"))
-            paint_icon(painter, box_rect.adjusted(2, 2, -2, -2), "check", theme.colour("onAccent"))
-        else:
-            fill = theme.colour("hover" if self.is_highlighted else "sunken" if theme.is_dark else "panel")
-            paint.box(painter, box_rect, theme.radius("key"), fill, theme.colour("controlBorder"))
-        colour = theme.colour("text" if self.isEnabled() else "textDisabled")
-        paint.text_line(
-            painter, rect.adjusted(side + GAP + 1, 0, 0, 0), self.text(), theme.font("body"), colour
-        )
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if not click_on_enter(self, event):
+            super().keyPressEvent(event)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        paint.set_elision_tooltip(self, self.text())
+
+    def initStyleOption(self, option: QStyleOptionButton) -> None:
+        super().initStyleOption(option)
+        contents = self.style().subElementRect(QStyle.SubElement.SE_CheckBoxContents, option, self)
+        elided = self.fontMetrics().elidedText(self.text(), Qt.TextElideMode.ElideRight, contents.width() + 1)
+        option.text = elided.replace("&", "&&")

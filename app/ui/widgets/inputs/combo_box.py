@@ -1,14 +1,13 @@
-"""Combo box with a painted arrow."""
+"""Combo box. The style sheet paints it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QRectF, QSize, Qt
-from PySide6.QtGui import QPainter, QPaintEvent, QWheelEvent
-from PySide6.QtWidgets import QComboBox, QStyledItemDelegate
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QWheelEvent
+from PySide6.QtWidgets import QComboBox, QStyle, QStyledItemDelegate, QStyleOptionComboBox
 
-from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.menus import clip_corners, set_round_corners
@@ -26,7 +25,6 @@ class ComboBox(QComboBox):
         self.setAccessibleName(name)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setProperty("focusRadius", theme.radius("control"))
-        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
         for value, text in options:
             self.addItem(text, value)
         self.setItemDelegate(QStyledItemDelegate(self))  # lets the style sheet set the padding of items
@@ -64,14 +62,10 @@ class ComboBox(QComboBox):
         else:
             event.ignore()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        theme = self._theme
-        painter = QPainter(self)
-        rect = QRectF(self.rect())
-        fill = theme.colour("hover" if self.underMouse() else "sunken" if theme.is_dark else "panel")
-        paint.box(painter, rect, theme.radius("control"), fill, theme.colour("controlBorder"))
-        colour = theme.colour("text" if self.isEnabled() else "textDisabled")
-        paint.text_line(painter, rect.adjusted(10, 0, -30, 0), self.currentText(), self.font(), colour)
-        icon_rect = QRectF(rect.right() - 26, rect.center().y() - 8, 16, 16)
-        paint_icon(painter, icon_rect, "chevron-down", theme.colour("textSecondary"))
-        painter.end()
+    def initStyleOption(self, option: QStyleOptionComboBox) -> None:
+        super().initStyleOption(option)
+        field = self.style().subControlRect(
+            QStyle.ComplexControl.CC_ComboBox, option, QStyle.SubControl.SC_ComboBoxEditField, self
+        )
+        text, mode = self.currentText(), Qt.TextElideMode.ElideRight
+        option.currentText = self.fontMetrics().elidedText(text, mode, field.width() - 1)

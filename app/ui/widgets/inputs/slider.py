@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QMouseEvent, QPainter, QPaintEvent, QPen, QWheelEvent
-from PySide6.QtWidgets import QGridLayout, QSizePolicy, QSlider, QWidget
+from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtGui import QMouseEvent, QWheelEvent
+from PySide6.QtWidgets import QGridLayout, QSizePolicy, QSlider, QStyle, QWidget
 
 from app.ui.theme.theme import Theme
-from app.ui.widgets import paint
 from app.ui.widgets.inputs.fields import NumberEdit
 from app.ui.widgets.labels import label
 
@@ -29,6 +28,9 @@ class SliderTrack(QSlider):
     def __init__(self, theme: Theme, steps: int) -> None:
         super().__init__(Qt.Orientation.Horizontal)
         self._theme = theme
+        self.setLayoutDirection(
+            Qt.LayoutDirection.LeftToRight
+        )  # Qt fills the wrong side of a mirrored slider
         self.setRange(0, steps)
         self.setSingleStep(1)
         self.setPageStep(PAGE_STEPS)
@@ -43,17 +45,10 @@ class SliderTrack(QSlider):
     def minimumSizeHint(self) -> QSize:
         return QSize(80, self._theme.size("sliderHandle") + 4)
 
-    def handle_centre(self) -> QPointF:
-        """Return the position of the handle's centre."""
-        handle_radius = self._theme.size("sliderHandle") / 2
-        span = max(1, self.maximum() - self.minimum())
-        fraction = (self.sliderPosition() - self.minimum()) / span
-        return QPointF(handle_radius + fraction * (self.width() - 2 * handle_radius), self.height() / 2)
-
     def _step_at(self, x: float) -> int:
-        handle_radius = self._theme.size("sliderHandle") / 2
-        fraction = (x - handle_radius) / max(1.0, self.width() - 2 * handle_radius)
-        return round(self.minimum() + min(max(fraction, 0.0), 1.0) * (self.maximum() - self.minimum()))
+        handle = self._theme.size("sliderHandle")
+        position, span = round(x - handle / 2), self.width() - handle
+        return QStyle.sliderValueFromPosition(self.minimum(), self.maximum(), position, span)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
@@ -79,23 +74,6 @@ class SliderTrack(QSlider):
             super().wheelEvent(event)
         else:
             event.ignore()
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        theme = self._theme
-        painter = QPainter(self)
-        middle = self.handle_centre()
-        track_height, handle_size = theme.size("sliderTrack"), theme.size("sliderHandle")
-        track_left, track_width = handle_size / 2 - 2, self.width() - handle_size + 4
-        track = QRectF(track_left, middle.y() - track_height / 2, track_width, track_height)
-        paint.box(painter, track, track_height / 2, theme.colour("borderStrong"))
-        track.setRight(middle.x())
-        is_enabled = self.isEnabled()
-        accent = theme.colour("accent" if is_enabled else "textDisabled")
-        paint.box(painter, track, track_height / 2, accent)
-        painter.setPen(QPen(accent, 2))
-        painter.setBrush(theme.colour("panel"))
-        painter.drawEllipse(middle, handle_size / 2 - 1, handle_size / 2 - 1)
-        painter.end()
 
 
 def decimals_of(step: float) -> int:
