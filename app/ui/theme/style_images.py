@@ -6,7 +6,7 @@ A style sheet can only show images from files. These files exist only in memory.
 from __future__ import annotations
 
 import struct
-from functools import lru_cache
+from functools import cache
 
 from PySide6.QtCore import QResource
 
@@ -14,7 +14,7 @@ FOLDER = "/studio"
 DIRECTORY = 2  # flag of Qt's resource format
 
 
-@lru_cache(maxsize=None)
+@cache
 def image_url(svg: str) -> str:
     """Return the URL of an image for the style sheet."""
     name = f"{image_url.cache_info().currsize}.svg"

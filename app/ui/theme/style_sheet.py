@@ -24,6 +24,7 @@ EXTRA_KINDS = {"titleLarge": (14.0, 600), "empty": (17.0, 600), "card": (15.0, 6
 
 CHECK_BOX_SIDE = 18  # px at 100 %
 SWITCH_WIDTH = 36
+STEP_MARK_SIZE = 22  # px at 100 %
 SWITCH = (
     '<svg xmlns="http://www.w3.org/2000/svg" width="34" height="18"><circle cx="{x}" cy="9" r="7"'
     ' fill="{colour}"/></svg>'
@@ -163,7 +164,8 @@ ComboBox::drop-down {{ subcontrol-origin: content; border: none; width: 16px; pa
 ComboBox::down-arrow {{ image: url({combo_image}); width: 16px; height: 16px; }}
 
 SliderTrack::groove, SliderTrack::sub-page {{
-    height: {track}px; margin: 0 {track_margin}px; border-radius: {track_radius}px; background: {borderStrong};
+    height: {track}px; margin: 0 {track_margin}px; border-radius: {track_radius}px;
+    background: {borderStrong};
 }}
 SliderTrack::sub-page {{ background: {accent}; }}
 SliderTrack::handle {{
@@ -173,6 +175,16 @@ SliderTrack::handle {{
 SliderTrack::sub-page:disabled {{ background: {textDisabled}; }}
 SliderTrack::handle:disabled {{ border-color: {textDisabled}; }}
 
+AlertBox[framed="true"] {{
+    background: {panel}; border: 1px solid {borderStrong}; border-radius: {panel_radius}px;
+}}
+AlertBox[framed="true"][status="error"] {{ background: {errorTint}; border-color: {errorBorder}; }}
+AlertBox[framed="true"][status="warn"] {{ background: {warnTint}; border-color: {warnBorder}; }}
+AlertBox[framed="true"][status="ok"] {{ background: {okTint}; border-color: {okBorder}; }}
+AlertBox[framed="true"][status="info"] {{ background: {infoTint}; }}
+AppBar {{ background: {window}; }}
+Bar {{ background: {panel}; }}
+
 Card {{ background: {panel}; border: 1px solid {border}; border-radius: {card}px; }}
 Card[sunken="true"] {{ background: {sunken}; }}
 Card[accented="true"] {{ border-color: {accent}; }}
@@ -181,10 +193,16 @@ Overlay {{ background: {raised}; border: 1px solid {borderStrong}; border-radius
 MotionPermissionCard {{ background: {raised}; border: 1px solid {warnBorder}; border-radius: {card}px; }}
 _MatchPopup {{ background: {raised}; border: 1px solid {borderStrong}; border-radius: {panel_radius}px; }}
 _ReadOnlyRow {{ background: {sunken}; border: 1px solid {borderStrong}; border-radius: {control}px; }}
+Legend {{ border: none; border-left: 3px solid {changed}; padding-left: 4px; margin: 2px 0 1px; }}
 StatusBar {{ background: {window}; }}
 LargeRoom {{ background: {panel}; }}
 ArmedStrip[armed="true"] {{ background: {warnTint}; }}
 ProblemRow:hover {{ background: {hover}; border-radius: {small}px; margin: 1px 4px; }}
+_StepMark {{
+    margin: 1px; border: 1px solid {controlBorder}; border-radius: {mark_radius}px; color: {textSecondary};
+}}
+_StepMark[state="next"] {{ background: {accent}; border-color: {accent}; color: {onAccent}; }}
+_StepMark[state="done"] {{ border: none; }}
 StepRow[state="next"] {{ background: {accentTint}; border-radius: {panel_radius}px; }}
 Segments {{ background: {sunken}; border: {segments_border}; border-radius: {panel_radius}px; }}
 IconLabel[tile="empty"] {{ background: {sunken}; border-radius: {palette}px; margin-bottom: 16px; }}
@@ -322,6 +340,7 @@ def build(theme: ThemeValues) -> str:
         field=theme.hex("sunken") if theme.is_dark else theme.hex("panel"),
         menu_button_padding=str(round(theme.scaled(14)) + 9),
         combo_image=image_url(icon_svg("chevron-down", theme.hex("textSecondary"))),
+        mark_radius=str(round(theme.scaled(STEP_MARK_SIZE)) // 2 - 1),
         track=str(track),
         track_radius=str(track // 2),
         track_margin=str((handle - track) // 2),

@@ -11,11 +11,10 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.buttons import Button
 from app.ui.widgets.indicators import status_name
-from app.ui.widgets.labels import label
+from app.ui.widgets.labels import IconLabel, label
 from nep.i18n import _
 
 TILE_SIZE = 28
-BORDER_ROLES = {"error": "errorBorder", "warn": "warnBorder", "ok": "okBorder", "info": "borderStrong"}
 
 
 class Card(QWidget):
@@ -60,27 +59,35 @@ class AlertBox(QWidget):
     Buttons are to the right of the text or, if there is too little space, below it.
     """
 
-    icon_side, icon_left, left, vertical_margin, gap = 18, 12, 40, 10, 10
+    icon_side, margin, left, vertical_margin, gap = 18, 12, 40, 10, 10
+    icon_alignment = Qt.AlignmentFlag.AlignTop
     min_text_width = 220  # minimum width of the text beside the buttons, in px at 100 %
 
     def __init__(self, theme: Theme, *, is_framed: bool = True) -> None:
         # Without a frame only the icon shows the status; used for "ok".
         super().__init__()
-        self._theme, self._is_framed = theme, is_framed
-        self._status = "info"
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        self.setProperty("framed", is_framed)
+        self._theme = theme
+        self._status_icon = IconLabel(theme, "info", side=self.icon_side, scales=False)
         self.text_column, self.button_row = QVBoxLayout(), QHBoxLayout()
         self.button_row.setSpacing(self.gap)
-        self._main_layout = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
-        vertical_margin = self.vertical_margin if is_framed else 4
-        self._main_layout.setContentsMargins(self.left, vertical_margin, 12, vertical_margin)
+        self._main_layout = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._main_layout.setSpacing(self.gap)
         self._main_layout.addLayout(self.text_column, 1)
         self._main_layout.addLayout(self.button_row)
+        vertical_margin = self.vertical_margin if is_framed else 4
+        row = QHBoxLayout(self)
+        row.setContentsMargins(self.margin, vertical_margin, self.margin, vertical_margin)
+        row.setSpacing(self.left - self.margin - self.icon_side)
+        row.addWidget(self._status_icon, 0, self.icon_alignment)
+        row.addLayout(self._main_layout, 1)
 
     def set_status(self, status: str) -> None:
         """Set the status, which determines the colours and the icon."""
-        self._status = status
-        self.update()
+        values = self._theme.status(status)
+        self._status_icon.set_icon(values.icon, values.colour)
+        paint.set_style_property(self, "status", status)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -100,21 +107,6 @@ class AlertBox(QWidget):
             self._main_layout.setDirection(direction)
             right = Qt.AlignmentFlag.AlignRight
             self._main_layout.setAlignment(self.button_row, Qt.AlignmentFlag(0) if fits_beside else right)
-
-    def icon_top(self) -> float:
-        """Return the distance in px between the upper edges of the box and the icon."""
-        return 11.0 if self._is_framed else 4.0
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        theme, painter = self._theme, QPainter(self)
-        status = theme.status(self._status)
-        if self._is_framed:
-            edge = theme.colour(BORDER_ROLES.get(self._status, "borderStrong"))
-            fill = theme.colour(status.tint or "panel")
-            paint.box(painter, QRectF(self.rect()), theme.radius("panel"), fill, edge)
-        icon_rect = QRectF(self.icon_left, self.icon_top(), self.icon_side, self.icon_side)
-        paint_icon(painter, icon_rect, status.icon, theme.colour(status.colour))
-        painter.end()
 
 
 class AlertRow(AlertBox):

@@ -193,21 +193,36 @@ class IconLabel(QLabel):
         self.setPixmap(icon.pixmap(QSize(side, side), self.devicePixelRatioF()))
 
 
-class Separator(QWidget):
+class LinedWidget(QWidget):
+    """Widget with a line of 1 px along an edge. The style sheet paints the background.
+
+    Args:
+        theme: Theme.
+        edge: Edge with the line.
+        parent: Parent.
+    """
+
+    def __init__(
+        self, theme: Theme, edge: Qt.Edge = Qt.Edge.BottomEdge, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        self._theme, self._edge = theme, edge
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        paint.hairline(painter, QRectF(self.rect()), self._edge, self._theme.colour("border"))
+        painter.end()
+
+
+class Separator(LinedWidget):
     """Line of 1 px: vertical between groups of buttons, or horizontal between parts of a panel."""
 
     def __init__(self, theme: Theme, *, upright: bool = False, length: int = 0) -> None:
-        super().__init__()
-        self._theme = theme
+        super().__init__(theme, Qt.Edge.LeftEdge if upright else Qt.Edge.TopEdge)
         if upright:
             self.setFixedWidth(1)
         else:
             self.setFixedHeight(1)
         if length:
             (self.setFixedHeight if upright else self.setFixedWidth)(length)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        edge = Qt.Edge.LeftEdge if self.width() == 1 else Qt.Edge.TopEdge
-        paint.hairline(painter, QRectF(self.rect()), edge, self._theme.colour("border"))
-        painter.end()

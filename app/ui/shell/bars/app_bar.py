@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtGui import QPainter, QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QWidget
 
 from app.core.robots.robot_link import CONNECTING, RobotLink
@@ -21,6 +21,7 @@ from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Chip, IconButton, Segments, StopButton, paint
 from app.ui.widgets.buttons import PaintedButton
+from app.ui.widgets.labels import LinedWidget
 from nep.i18n import _, lazy, ngettext
 
 FIELD_WIDTH, FIELD_HEIGHT, LEFT_PADDING, ICON_SIZE, GAP = 248, 28, 10, 14, 9
@@ -38,7 +39,7 @@ CHIP_TEXTS = {
 """Templates for the text of the robot chip if one robot is connected, by state."""
 
 
-class AppBar(QWidget):
+class AppBar(LinedWidget):
     """Bar with the menus at the left, the layout switch in the middle and the robots at the right."""
 
     layout_selected = Signal(str)
@@ -52,12 +53,11 @@ class AppBar(QWidget):
         parent: QWidget | None = None,
     ) -> None:
         # `platform` is a value of `sys.platform`.
-        super().__init__(parent)
-        self._theme = theme
+        super().__init__(theme, parent=parent)
         self.setMinimumHeight(theme.size("appBar"))
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName(_("Menus and layouts"))
-        self.menus = MenuBar(theme)
+        self.menus = MenuBar()
         self.is_menu_bar_native = platform == "darwin"  # macOS shows the menus at the top of the screen
         self.menus.setNativeMenuBar(self.is_menu_bar_native)
         self.menus.setSizePolicy(QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Preferred)
@@ -169,13 +169,6 @@ class AppBar(QWidget):
             self._fit()
         else:
             self.chip.set(text, status)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        rect = self.rect()
-        painter.fillRect(rect, self._theme.colour("window"))
-        paint.hairline(painter, QRectF(rect), Qt.Edge.BottomEdge, self._theme.colour("border"))
-        painter.end()
 
 
 class PaletteField(PaintedButton):

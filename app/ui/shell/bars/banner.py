@@ -153,7 +153,8 @@ def _fitting_word_count(font: QFont, words: Sequence[str], width: float) -> int:
 class Banner(AlertBox):
     """Banner with an icon, a title, a detail, up to two buttons, and a close button."""
 
-    icon_side, icon_left, left, vertical_margin, gap = 18, 12, 40, 0, 6
+    vertical_margin, gap = 0, 6
+    icon_alignment = Qt.AlignmentFlag.AlignVCenter
 
     pressed = Signal()
     second_pressed = Signal()
@@ -247,9 +248,6 @@ class Banner(AlertBox):
         self.button.icon_name = NARROW_BUTTON_ICON if is_narrow and self._icon is None else self._icon
         self.button.set_label("" if is_narrow else self._step_text, name=self._step_text)
         self.button.setToolTip(plain.tip(self._step_text if is_narrow else ""))
-
-    def icon_top(self) -> float:
-        return (self.height() - self.icon_side) / 2
 
 
 class AlertBanner(QWidget):

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, QObject, QRectF, Qt, Signal
-from PySide6.QtGui import QAction, QFontMetricsF, QKeyEvent, QPainter, QPaintEvent, QShowEvent
-from PySide6.QtWidgets import QMenuBar, QWidget
+from PySide6.QtCore import QEvent, QObject, Qt, Signal
+from PySide6.QtGui import QAction, QKeyEvent, QShowEvent
+from PySide6.QtWidgets import QMenuBar, QStyleOptionMenuItem
 
-from app.ui.theme.theme import Theme
-from app.ui.widgets import paint
 from app.ui.widgets.mnemonics import strip_mnemonic
 
 
@@ -32,9 +30,8 @@ class _AltKeyFilter(QObject):
 class MenuBar(QMenuBar):
     """Menu bar whose mnemonics are underlined only while Alt is held."""
 
-    def __init__(self, theme: Theme) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self._theme = theme
         self._shows_mnemonics = False
         self._alt = _AltKeyFilter(self)
         self._alt.held_changed.connect(self._show_mnemonics)
@@ -57,30 +54,7 @@ class MenuBar(QMenuBar):
             self._shows_mnemonics = visible
             self.update()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        for action in self.actions():
-            rect = self.actionGeometry(action)
-            if action.isVisible() and not rect.isEmpty():
-                self._paint_entry(painter, QRectF(rect), action)
-        painter.end()
-
-    def _paint_entry(self, painter: QPainter, rect: QRectF, action: QAction) -> None:
-        theme, font, text = self._theme, self.font(), strip_mnemonic(action.text())
-        is_active, menu = action is self.activeAction(), action.menu()
-        if is_active:
-            is_open = isinstance(menu, QWidget) and menu.isVisible()
-            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-            paint.box(painter, rect, theme.radius("small"), theme.colour("pressed" if is_open else "hover"))
-        colour = theme.colour("text" if is_active else "textSecondary")
-        text_width, metrics = paint.width_of(font, text), QFontMetricsF(font)
-        text_left = rect.center().x() - text_width / 2
-        paint.text_line(
-            painter, QRectF(text_left, rect.top(), text_width + 1, rect.height()), text, font, colour
-        )
-        letter = action.text().find("&")
-        if letter >= 0 and (self._shows_mnemonics or self.hasFocus()):
-            start = text_left + paint.width_of(font, text[:letter])
-            line = QRectF(start, 0, paint.width_of(font, text[letter]), 1)
-            line.moveTop(round(rect.center().y() + metrics.ascent() / 2 + 1))
-            painter.fillRect(line, colour)
+    def initStyleOption(self, option: QStyleOptionMenuItem, action: QAction) -> None:
+        super().initStyleOption(option, action)
+        if not (self._shows_mnemonics or self.hasFocus()):
+            option.text = strip_mnemonic(option.text).replace("&", "&&")

@@ -18,6 +18,7 @@ from app.ui.text import plain
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, IconButton, RunButton, Separator, StopButton, label, paint
+from app.ui.widgets.labels import LinedWidget
 from app.ui.widgets.menus import Menu, open_below
 from nep.i18n import _
 
@@ -289,21 +290,13 @@ class StopResultLabel(QWidget):
         )
 
 
-class Bar(QWidget):
+class Bar(LinedWidget):
     """Base class of the bars below the app bar, with a separator line at the bottom."""
 
     def __init__(self, theme: Theme, height: int) -> None:
-        super().__init__()
-        self._theme = theme
+        super().__init__(theme)
         self.setMinimumHeight(height)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        rect = self.rect()
-        painter.fillRect(rect, self._theme.colour("panel"))
-        paint.hairline(painter, QRectF(rect), Qt.Edge.BottomEdge, self._theme.colour("border"))
-        painter.end()
 
 
 def free_area(bar: Bar, left: int, right_widgets: Iterable[QWidget]) -> QRect:

@@ -6,8 +6,8 @@ import datetime as dt
 from pathlib import Path
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QPainter, QPaintEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtGui import QPainter
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout
 
 from app.core.storage.settings import RecentFile
 from app.ui.shell.start_page.art import Art, upper_corners
@@ -18,6 +18,7 @@ from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Card, Chip, ElidedLabel, label, paint
 from app.ui.widgets.buttons import LinkButton, PaintedButton
+from app.ui.widgets.labels import IconLabel, LinedWidget
 from nep.i18n import _
 
 EXAMPLE_ART_HEIGHT = 112
@@ -151,14 +152,13 @@ class RecentRow(PaintedButton):
         paint.text_line(painter, area, self._when, small, theme.colour("textTertiary"), paint.RIGHT)
 
 
-class DevelopersLine(QWidget):
+class DevelopersLine(LinedWidget):
     """Line at the bottom of the page with a command and a link for programmers."""
 
     developer_pressed = Signal()
 
     def __init__(self, theme: Theme) -> None:
-        super().__init__()
-        self._theme = theme
+        super().__init__(theme, Qt.Edge.TopEdge)
         self.setMinimumHeight(44)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         link = LinkButton(theme, _("Open the Developer layout"))
@@ -166,10 +166,7 @@ class DevelopersLine(QWidget):
         row = QHBoxLayout(self)
         row.setSpacing(6)
         row.addStretch(1)
-        icon = QLabel()
-        icon.setPixmap(theme.icon("terminal", "textSecondary").pixmap(14, 14))
-        theme.changed.connect(lambda: icon.setPixmap(theme.icon("terminal", "textSecondary").pixmap(14, 14)))
-        row.addWidget(icon)
+        row.addWidget(IconLabel(theme, "terminal", side=14, scales=False))
         question = ElidedLabel("body", "textSecondary")
         question.setText(_("Are you a developer?"))
         row.addWidget(question)
@@ -179,8 +176,3 @@ class DevelopersLine(QWidget):
         command.setProperty("keyCap", "true")
         row.addWidget(command)
         row.addStretch(1)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        paint.hairline(painter, QRectF(self.rect()), Qt.Edge.TopEdge, self._theme.colour("border"))
-        painter.end()

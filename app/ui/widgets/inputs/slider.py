@@ -28,9 +28,8 @@ class SliderTrack(QSlider):
     def __init__(self, theme: Theme, steps: int) -> None:
         super().__init__(Qt.Orientation.Horizontal)
         self._theme = theme
-        self.setLayoutDirection(
-            Qt.LayoutDirection.LeftToRight
-        )  # Qt fills the wrong side of a mirrored slider
+        # Qt fills the wrong side of a mirrored slider
+        self.setLayoutDirection(Qt.LayoutDirection.LeftToRight)
         self.setRange(0, steps)
         self.setSingleStep(1)
         self.setPageStep(PAGE_STEPS)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from PySide6.QtCore import QRectF, QSize, Qt
-from PySide6.QtGui import QAction, QPainter, QPaintEvent
-from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
 from app.core.projects.examples import example_block_ids
 from app.errors import SettingsError
@@ -24,7 +24,7 @@ from app.ui.panels.build.first_steps.steps import (
     find_tutorial_blocks,
 )
 from app.ui.panels.home import TabHome
-from app.ui.theme.icons import paint_icon
+from app.ui.theme.style_sheet import STEP_MARK_SIZE
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Chip, EmptyAction, EmptyState, label, paint
 from app.ui.widgets.labels import set_role
@@ -32,38 +32,39 @@ from app.ui.widgets.lists.scroll_areas import ScrollColumn
 from nep.i18n import _, lazy, pgettext
 
 HINT_DELAY_S = 20.0
-MARK_SIZE = 22
 ALL_DONE_TEXT = lazy("First steps done")
 DETACHED_HINT = lazy("Drag it up until it snaps below “{start}”.")
 WHAT_NEXT_TEXT = lazy("You can now build, run and stop a behaviour. Open an example to learn more.")
 
 
-class _StepMark(QWidget):
+class _StepMark(QLabel):
     """Check mark of a completed step, or the step's number in a circle, filled for the next step."""
 
     def __init__(self, theme: Theme, number: int) -> None:
         super().__init__()
         self._theme, self._number = theme, number
-        self.state = "later"
+        self.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.setProperty("kind", "caption")
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.show_state("later")
+        theme.changed.connect(self._update_contents)
+
+    def show_state(self, state: str) -> None:
+        """Show the mark in the state "done", "next" or "later"."""
+        paint.set_style_property(self, "state", state)
+        self._update_contents()
 
     def sizeHint(self) -> QSize:
-        side = round(self._theme.scaled(MARK_SIZE))
+        side = round(self._theme.scaled(STEP_MARK_SIZE))
         return QSize(side, side)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        theme, painter = self._theme, QPainter(self)
-        rect = QRectF(self.rect()).adjusted(1, 1, -1, -1)
-        if self.state == "done":
-            paint_icon(painter, rect, "circle-check", theme.colour("ok"))
+    def _update_contents(self) -> None:
+        if self.property("state") == "done":
+            side = self.sizeHint().width() - 2
+            icon = self._theme.icon("circle-check", "ok")
+            self.setPixmap(icon.pixmap(QSize(side, side), self.devicePixelRatioF()))
         else:
-            is_next = self.state == "next"
-            fill = theme.colour("accent") if is_next else None
-            outline = theme.colour("accent" if is_next else "controlBorder")
-            paint.box(painter, rect, rect.height() / 2, fill, outline, 1.25)
-            colour = theme.colour("onAccent" if is_next else "textSecondary")
-            paint.text_line(painter, rect, str(self._number), theme.font("caption"), colour, paint.CENTRE)
-        painter.end()
+            self.setText(str(self._number))
 
 
 class StepRow(QWidget):
@@ -107,14 +108,13 @@ class StepRow(QWidget):
 
     def show_state(self, state: str) -> None:
         """Show the step in the state "done", "next" or "later"."""
-        self.mark.state = state
+        self.mark.show_state(state)
         paint.show_when(self.hint, state == "next")
         paint.show_when(self.button, state == "next")
         set_role(self.text_label, "textSecondary" if state == "done" else "text")
         template = {"done": _("{step}: done"), "next": _("{step}: the next step"), "later": "{step}"}[state]
         self.setAccessibleName(template.format(step=self.text_label.text()))
         paint.set_style_property(self, "state", state)
-        self.mark.update()
 
     def show_hint(self, *, is_detached: bool) -> None:
         """Show where to find the block; if `is_detached` is True, that it must be attached to the script."""

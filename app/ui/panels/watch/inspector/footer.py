@@ -6,9 +6,8 @@ import time
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QRectF, QSize, Qt
-from PySide6.QtGui import QPainter, QPaintEvent
-from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
 from app.core.network.topics import split_key
 from app.core.networks.kinds import find_kind
@@ -16,8 +15,8 @@ from app.core.timeline.times import clock_text
 from app.ui.text import plain
 from app.ui.text.numbers import age_text, group_digits, latency_text, size_text
 from app.ui.theme.theme import Theme
-from app.ui.widgets import FixedWidthLabel, IconButton, Separator, label, paint
-from nep.i18n import _, lazy
+from app.ui.widgets import FixedWidthLabel, IconButton, Separator, label
+from nep.i18n import _
 
 if TYPE_CHECKING:
     from app.core.messages.inspected import InspectedMessage
@@ -83,29 +82,16 @@ def _unreported_info(message: Message, network: str) -> Iterator[str]:
         yield _("{network} doesn't report latency").format(network=network)
 
 
-class Legend(QWidget):
+class Legend(QLabel):
     """Legend of the coloured bars at the left of changed rows."""
 
-    TEXT = lazy("changed")
-
-    def __init__(self, theme: Theme) -> None:
-        super().__init__()
-        self._theme = theme
-        self._text = _(self.TEXT)
+    def __init__(self) -> None:
+        super().__init__(_("changed"))
+        self.setIndent(0)
+        self.setProperty("kind", "small")
+        self.setProperty("role", "changed")
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setAccessibleName(_("A bar on the left marks changed values"))
-
-    def sizeHint(self) -> QSize:
-        font = self._theme.font("small")
-        return QSize(round(paint.width_of(font, self._text)) + 10, max(18, round(paint.height_of(font)) + 2))
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        colour = self._theme.colour("changed")
-        painter.fillRect(QRectF(0, self.height() / 2 - 7, 3, 14), colour)
-        text_rect = QRectF(self.rect()).adjusted(7, 0, 3, 0)
-        paint.text_line(painter, text_rect, self._text, self._theme.font("small"), colour)
-        painter.end()
 
 
 class Footer(QWidget):
@@ -126,7 +112,7 @@ class Footer(QWidget):
         self.copy_path = IconButton(theme, "link", _("Copy path"), "Ctrl+Shift+C", size=26)
         self.plot = IconButton(theme, "chart-line", _("Plot"), "Ctrl+Shift+L", size=26)
         self.info = FixedWidthLabel("small", "textTertiary")
-        self.legend = Legend(theme)
+        self.legend = Legend()
         rows = QVBoxLayout(self)
         rows.setContentsMargins(0, 0, 0, 0)
         rows.setSpacing(0)
