@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QLabel
 
 from app.core.session import Session
 from app.ui.panels.base import PanelContext
@@ -164,6 +164,34 @@ def test_panels_are_restored_with_their_topics_after_restart(qtbot, bench, windo
     ]  # fmt: skip
     qtbot.waitUntil(lambda: places == {key: again.docks[key].geometry() for key in places})
     again.dispose()
+
+
+def test_panel_is_styled_once_when_its_layout_is_opened(window: MainWindow) -> None:
+    labels: list[StyledLabel] = []
+
+    class LabelPanel(PlainPanel):
+        def __init__(self, context: PanelContext, title: str) -> None:
+            super().__init__(context, title)
+            labels.append(StyledLabel(self))
+            labels[-1].ensurePolished()  # as the size of a scroll area's contents does
+
+    panels = {**PANELS, "topics": replace(PANELS["topics"], make=lambda c: LabelPanel(c, "Topics"))}
+    bench = Workbench(window.theme, layout_named("developer"), panels, window.context, window.pages)
+    window.pages.addWidget(bench)
+    bench.reset_layout()
+    assert "topics" in bench.docks
+    assert [label.style_count for label in labels] == [1]
+    bench.dispose()
+
+
+class StyledLabel(QLabel):
+    """Label that counts how often the style sheet is applied to it."""
+
+    style_count = 0
+
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        self.style_count += event.type() == QEvent.Type.StyleChange
 
 
 def test_layouts_of_earlier_and_later_versions_are_restored(qtbot, bench) -> None:

@@ -6,8 +6,17 @@ import pytest
 from PySide6.QtCore import QPoint, QPointF, QRect, QRectF, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QWheelEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QComboBox, QLabel, QStyleOptionButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QApplication,
+    QComboBox,
+    QLabel,
+    QStyleOptionButton,
+    QStyleOptionComboBox,
+    QVBoxLayout,
+    QWidget,
+)
 
+from app.core.storage.settings import Mode
 from app.ui.theme.style_sheet import BUTTON_COLOURS
 from app.ui.theme.theme import Theme
 from app.ui.widgets import (
@@ -30,9 +39,11 @@ from app.ui.widgets import (
     paint,
 )
 from app.ui.widgets.buttons import Kind
+from app.ui.widgets.cards import AlertRow
 from app.ui.widgets.indicators import paint_sparkline
+from app.ui.widgets.inputs.check_box import CheckBox
 from app.ui.widgets.inputs.fields import LongTextField
-from app.ui.widgets.inputs.slider import decimals_of
+from app.ui.widgets.inputs.slider import SliderTrack, decimals_of
 from app.ui.widgets.keyboard import tab_stops_of
 from app.ui.widgets.labels import IconLabel
 from app.ui.widgets.lists.scroll_areas import ContentScrollArea, ScrollColumn
@@ -262,6 +273,7 @@ def test_empty_state_button_runs_its_action(qtbot, theme: Theme) -> None:
 
 
 def test_switch_is_toggled_with_space(qtbot, theme: Theme) -> None:
+    theme.apply()
     switch = Switch(theme, "loud")
     shown(qtbot, switch)
     QTest.keyClick(switch, Qt.Key.Key_Space)
@@ -438,6 +450,80 @@ def test_button_shows_that_it_is_pressed(qtbot, theme: Theme, kind: Kind) -> Non
     assert pressed not in colours(button)
     button.setDown(True)
     assert pressed in colours(button)
+
+
+@pytest.mark.parametrize("kind", [CheckBox, Switch])
+def test_check_box_shows_ampersands_and_elides_text_that_does_not_fit(
+    qtbot, theme: Theme, kind: type[CheckBox]
+) -> None:
+    theme.apply()
+    box, option = kind(theme, "Salt & pepper"), QStyleOptionButton()
+    shown(qtbot, box)
+    box.resize(box.sizeHint())
+    box.initStyleOption(option)
+    assert option.text == "Salt && pepper"
+    assert not box.toolTip()
+    box.resize(90, box.height())
+    box.initStyleOption(option)
+    assert option.text.endswith("…")
+    assert "Salt" in box.toolTip()
+
+
+@pytest.mark.parametrize("mode", ["light", "dark"])
+def test_check_mark_and_knob_have_the_colours_of_the_theme(qtbot, theme: Theme, mode: Mode) -> None:
+    theme.set_mode(mode)
+    holder = QWidget()
+    column = QVBoxLayout(holder)
+    box, switch = CheckBox(theme, ""), Switch(theme, "")
+    for each in (box, switch):
+        column.addWidget(each)
+    shown(qtbot, holder)
+    accent, mark = theme.colour("accent").name(), theme.colour("onAccent").name()
+    assert accent not in colours(box) | colours(switch)
+    assert theme.colour("controlBorder").name() in colours(switch)
+    for each in (box, switch):
+        each.setChecked(True)
+        assert {accent, mark} <= colours(each)
+    switch.setEnabled(False)
+    assert accent not in colours(switch)
+
+
+def test_combo_box_elides_text_that_does_not_fit(qtbot, theme: Theme) -> None:
+    theme.apply()
+    choice, option = ComboBox(theme, [("a", "a text that doesn't fit")]), QStyleOptionComboBox()
+    shown(qtbot, choice)
+    choice.resize(choice.sizeHint())
+    choice.initStyleOption(option)
+    assert option.currentText == "a text that doesn't fit"
+    choice.resize(90, choice.height())
+    choice.initStyleOption(option)
+    assert option.currentText.endswith("…")
+
+
+@pytest.mark.parametrize("direction", [Qt.LayoutDirection.LeftToRight, Qt.LayoutDirection.RightToLeft])
+def test_slider_is_filled_up_to_its_value(qtbot, theme: Theme, direction: Qt.LayoutDirection) -> None:
+    theme.apply()
+    holder = QWidget()
+    holder.setLayoutDirection(direction)
+    track = SliderTrack(theme, 100)
+    track.setParent(holder)
+    track.resize(200, track.sizeHint().height())
+    track.setValue(75)
+    shown(qtbot, holder)
+    image, middle = track.grab().toImage(), track.height() // 2
+    assert image.pixelColor(50, middle) == theme.colour("accent")
+    assert image.pixelColor(180, middle) == theme.colour("borderStrong")
+
+
+def test_alert_shows_the_colours_and_icon_of_its_status(qtbot, theme: Theme) -> None:
+    theme.apply()
+    row = AlertRow(theme)
+    row.resize(300, 60)
+    shown(qtbot, row)
+    for status in ("error", "warn"):
+        row.set_texts(status, "No master answers", "")
+        values = theme.status(status)
+        assert {theme.colour(str(values.tint)).name(), theme.colour(values.colour).name()} <= colours(row)
 
 
 def test_icon_of_a_button_is_mirrored_in_a_right_to_left_layout(qtbot, theme: Theme) -> None:
