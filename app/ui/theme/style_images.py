@@ -13,16 +13,15 @@ from PySide6.QtCore import QResource
 FOLDER = "/studio"
 DIRECTORY = 2  # flag of Qt's resource format
 
+_registered: list[bytes] = []  # Qt doesn't copy the data
+
 
 @cache
 def image_url(svg: str) -> str:
     """Return the URL of an image for the style sheet."""
-    name = f"{image_url.cache_info().currsize}.svg"
+    name = f"{len(_registered)}.svg"
     _register(name, svg.encode())
     return f":{FOLDER}/{name}"
-
-
-_registered: list[bytes] = []  # Qt doesn't copy the data
 
 
 def _register(name: str, content: bytes) -> None:
