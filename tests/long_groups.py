@@ -27,7 +27,7 @@ class Group(NamedTuple):
         name: Name shown to the developer.
         tests: Prefixes of the paths of its tests; ``path::part``: only node IDs that contain the part.
         sources: Prefixes of other paths that the tests depend on.
-        quick: Prefixes of the paths of tests that run always.
+        quick: Prefixes of the paths or node IDs of tests that run always.
     """
 
     name: str
@@ -57,6 +57,67 @@ GROUPS = (
             "tests/e2e/test_path_keys.py",
         ),
         sources=("tests/e2e/film.py", "tests/e2e/fingers.py", "tests/e2e/teacher_session.py"),
+    ),
+    Group(
+        "restarts of the window",  # every run includes the other tests of test_unsaved_work.py
+        tests=(
+            "tests/e2e/test_backpack.py",
+            "tests/e2e/test_first_steps.py",
+            "tests/e2e/test_layouts.py",
+            "tests/e2e/test_report.py",
+            "tests/e2e/test_tabs.py",
+            "tests/e2e/test_two_studios.py",
+            "tests/e2e/test_unsaved_work.py::tab_order",
+            "tests/e2e/test_unsaved_work.py::discarded",
+            "tests/e2e/test_virtual_robots.py",
+        ),
+        sources=(
+            "app/core/projects/",
+            "app/core/reports/",
+            "app/core/storage/",
+            "app/ui/shell/docking/",
+            "app/ui/shell/projects.py",
+            "app/ui/shell/window_state.py",
+            "app/ui/startup/",
+        ),
+        quick=("tests/e2e/test_first_steps.py::test_first_steps_are_not_offered_again_after_kill_9",),
+    ),
+    Group(
+        "questions and edits of running programs",  # every run includes test_behaviour.py
+        tests=(
+            "tests/e2e/test_ask.py",
+            "tests/e2e/test_fights.py",
+            "tests/e2e/test_run_habits.py",
+            "tests/e2e/test_tries.py",
+        ),
+        sources=(
+            "app/blocks/runtime/",
+            "app/core/run/",
+            "app/ui/panels/build/",
+            "app/ui/shell/commands/behaviours.py",
+            "app/ui/shell/dialogs/",
+        ),
+        quick=("tests/e2e/test_ask.py::test_question_is_answered_by_typing_and_enter",),
+    ),
+    Group(
+        "menus and drags of the window",  # every run includes the film of test_path_mouse.py
+        tests=(
+            "tests/e2e/test_alerts.py",
+            "tests/e2e/test_carrying.py",
+            "tests/e2e/test_habits.py",
+            "tests/e2e/test_menu_keys.py",
+        ),
+        sources=(
+            "app/blocks/editor/src/",
+            "app/ui/blockly/",
+            "app/ui/shell/actions/",
+            "app/ui/shell/bars/",
+            "app/ui/shell/commands/",
+        ),
+        quick=(
+            "tests/e2e/test_carrying.py::test_blocks_dropped_on_another_tab",
+            "tests/e2e/test_menu_keys.py::test_alt_and_a_letter",
+        ),
     ),
     Group(
         "ROS 2",  # every run includes the contract over Cyclone DDS: test_ros2.py[test_contract.py-]

@@ -10,6 +10,14 @@ import pytest
 from tests.long_groups import GROUPS, ROOT, changes, is_skipped, relative_arguments, report, skipped_groups
 
 NAMES = tuple(group.name for group in GROUPS)
+E2E_NAMES = (
+    "films",
+    "restarts of the window",
+    "questions and edits of running programs",
+    "menus and drags of the window",
+    "interop",
+    "soak",
+)
 
 
 def git(folder: Path, *arguments: str) -> None:
@@ -77,7 +85,9 @@ def test_changes_are_unknown_in_a_shallow_clone_and_outside_a_repository(
         ("tests/nep/backends/test_ros2.py", {"ROS 2"}),
         ("bench/soak.py", {"soak"}),
         ("app/ui/theme/fonts.py", {"high DPI"}),
-        ("app/ui/shell/docking/dock.py", {"high DPI", "layout permutations"}),
+        ("app/ui/shell/docking/dock.py", {"high DPI", "layout permutations", "restarts of the window"}),
+        ("app/blocks/runtime/child.py", {"questions and edits of running programs"}),
+        ("app/ui/blockly/bridge.py", {"menus and drags of the window"}),
         ("tests/e2e/teacher_session.py", {"films"}),
         ("README.md", set()),
     ],
@@ -89,7 +99,7 @@ def test_changed_file_runs_the_groups_that_depend_on_the_file(path: str, run: se
 def test_groups_named_on_the_command_line_run() -> None:
     assert skipped_groups([]) == NAMES
     assert skipped_groups([], ["tests/installers/test_linux.py::test_x", "tests/core/"]) == ()
-    assert skipped_groups([], ["tests/e2e/"]) == ("films", "interop", "soak")
+    assert skipped_groups([], ["tests/e2e/"]) == E2E_NAMES
     assert relative_arguments(["ui", "../dev.py::x"], ROOT / "tests") == ("tests/ui/", "dev.py::x")
 
 
@@ -100,13 +110,19 @@ def test_each_group_has_tests_and_sources_that_exist() -> None:
     files = listed.stdout.splitlines()
     for group in GROUPS:
         for prefix in (*group.files, *group.sources, *group.quick):
-            assert any(file.startswith(prefix) for file in files), prefix
+            path, _, test = prefix.partition("::")
+            found = [file for file in files if file.startswith(path)]
+            assert found, prefix
+            assert not test or f"def {test}" in (ROOT / found[0]).read_text(encoding="utf-8"), prefix
 
 
 def test_only_tests_of_skipped_groups_are_skipped() -> None:
     assert is_skipped("tests/installers/test_linux.py::test_x", ["installers"])
     assert not is_skipped("tests/installers/test_linux.py::test_x", ["soak"])
     assert not is_skipped("tests/installers/test_contents.py::test_x", ["installers"])
+    ask = "tests/e2e/test_ask.py::test_"
+    assert is_skipped(f"{ask}stop_removes_the_choices_of_a_question", NAMES)
+    assert not is_skipped(f"{ask}question_is_answered_by_typing_and_enter", NAMES)
     ros2 = "tests/nep/backends/test_ros2.py::test_inside"
     assert is_skipped(f"{ros2}[ros2_child.py-]", ["ROS 2"])
     assert not is_skipped(f"{ros2}[test_contract.py-]", ["ROS 2"])
