@@ -82,7 +82,7 @@ class NanomsgPublisher(HandshakePublisher, BasePublisher):
         """Listener and its endpoint by host."""
         self._history: History[bytes] = History(spec.history)
         self._topic = topic_part(spec.topic)
-        self._is_closed = False
+        self.is_closed = False
         self._is_released = False
         self._connections: dict[int, _Connection] = {}
         """Connections by the id of their pipe."""
@@ -150,7 +150,7 @@ class NanomsgPublisher(HandshakePublisher, BasePublisher):
         extension = extension_part(extension_fields) if extension_fields else b""
         size = len(data) if isinstance(data, bytes) else data.nbytes
         with self._changed:
-            if self._is_closed:
+            if self.is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
             header = self._next_header_locked(size, has_extension=bool(extension))
             tail = b"".join((header.pack(), data, extension))
@@ -255,7 +255,7 @@ class NanomsgPublisher(HandshakePublisher, BasePublisher):
     def send_bye(self) -> None:
         """Send the bye, after which subscribers read the remaining messages and disconnect."""
         with self._changed:
-            self._is_closed = True
+            self.is_closed = True
             self._send_bye_locked()
 
     def finish(self, deadline: float) -> None:
@@ -288,7 +288,7 @@ class NanomsgPublisher(HandshakePublisher, BasePublisher):
         with self._changed:
             if self._is_released:
                 return
-            self._is_closed = self._is_released = True
+            self.is_closed = self._is_released = True
         self._socket.close()
 
     def _send_bye_locked(self) -> None:

@@ -80,6 +80,8 @@ class HandshakePublisher:
     The condition `changed` guards the publisher's state.
     """
 
+    is_closed = False
+
     def __init__(self, changed: threading.Condition, counts_at_hello: dict[int, int]) -> None:
         """Initialize the publisher.
 
@@ -113,17 +115,24 @@ class HandshakePublisher:
                 self._node_names[subscriber.id] = subscriber.node_name
 
     def wait_for(self, expected: Iterable[ExpectedSubscriber], timeout_s: float) -> tuple[int, ...]:
-        """Wait up to `timeout_s` seconds for the hellos of these subscribers; return the missing ids."""
-        expected_ids = {each.id for each in expected}
+        """Wait up to `timeout_s` seconds for the hellos of these subscribers; return the missing ids.
+
+        The wait ends when the publisher is closed, as if no subscriber were missing.
+        """
+        missing_ids = {each.id for each in expected}
+
+        def has_ended() -> bool:
+            missing_ids.difference_update(self._counts_at_hello)
+            return self.is_closed or not missing_ids
+
         with self._changed:
-            wait_until(self._changed, lambda: expected_ids <= self._counts_at_hello.keys(), timeout_s)
-            return tuple(expected_ids - self._counts_at_hello.keys())
+            wait_until(self._changed, has_ended, timeout_s)
+            return () if self.is_closed else tuple(missing_ids)
 
 
 class NativePublisher(HandshakePublisher):
     """Publisher on the native wire. Owns its socket, an XPUB that `move` or `legacy.attach` binds later."""
 
-    is_closed = False
     has_subscribers = False
     """True if any subscriber is connected, with or without a hello."""
 

@@ -66,6 +66,17 @@ def stranger(master: Master) -> Iterator[Stranger]:
     made.node.close()
 
 
+def test_closing_ends_the_wait_for_replies(stopper: RobotStopper, pepper: WireRobot) -> None:
+    pepper.silent = {"stop"}
+    reports: list[StopReport] = []
+    thread = threading.Thread(target=lambda: reports.append(stopper.stop_all(["Pepper"], timeout_s=600.0)))
+    thread.start()
+    until(lambda: bool(pepper.heard("stop")))
+    stopper.close()
+    thread.join(LONG_S)
+    assert [report.is_confirmed for report in reports] == [False]
+
+
 def test_foreign_reply_does_not_confirm_stop_of_a_frozen_robot(stopper, pepper, stranger) -> None:
     pepper.silent = {"stop"}
     report = stopper.stop_all(["Pepper"], timeout_s=SHORT_S)

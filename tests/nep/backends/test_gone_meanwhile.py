@@ -10,9 +10,23 @@ import pytest
 import nep
 from nep.backends.zeromq.master_session import MasterSession
 from nep.backends.zeromq.native_subscriber import NativeSubscriber
+from nep.backends.zeromq.publisher import HandshakePublisher
 from nep.masters.master import Master
-from nep.protocol.requests import FoundReply, SubscriberRecord
+from nep.protocol.requests import ExpectedSubscriber, FoundReply, SubscriberRecord
 from tests.nep.programs import eventually
+
+
+def test_wait_for_subscribers_ends_when_the_publisher_is_closed() -> None:
+    changed = threading.Condition()
+    publisher = HandshakePublisher(changed, {})
+    missing: list[tuple[int, ...]] = []
+    expected = [ExpectedSubscriber(1, "2", "vanished")]
+    thread = threading.Thread(target=lambda: missing.append(publisher.wait_for(expected, 600.0)))
+    thread.start()
+    with changed:
+        publisher.is_closed = True
+    thread.join(60.0)
+    assert missing == [()]
 
 
 @pytest.mark.usefixtures("patient")

@@ -64,6 +64,7 @@ class RobotStopper:
         self._clock = clock
         self._sender = f"stopper-{uuid.uuid4().hex[:8]}"
         self._changed = threading.Condition()
+        self._is_closed = False
         self._opening_lock = threading.Lock()  # held while opening connections
         self._opener_threads: list[threading.Thread] = []
         self._lines: dict[str, StopLine] = {}
@@ -238,7 +239,9 @@ class RobotStopper:
                 remaining_s = deadline_s - self._clock()
                 pause_s = min(remaining_s, limits.STOP_LOOKUP_INTERVAL_S) if self._inbox else remaining_s
                 pause_s = min(pause_s, limits.CONNECTION_CHECK_INTERVAL_S) if undelivered else pause_s
-                self._changed.wait_for(lambda: self._has_new_replies(requests, reported), max(0.0, pause_s))
+                self._changed.wait_for(
+                    lambda: self._is_closed or self._has_new_replies(requests, reported), max(0.0, pause_s)
+                )
                 new_results = [
                     (request, node, result)
                     for request in requests
@@ -248,11 +251,15 @@ class RobotStopper:
                 reported.add((request.id, node))
                 if on_answer is not None:
                     on_answer(result)
-            if all(request.is_settled for request in requests) or self._clock() >= deadline_s:
+            is_over = self._is_closed or self._clock() >= deadline_s
+            if is_over or all(request.is_settled for request in requests):
                 return reported
 
     def close(self) -> None:
-        """Disconnect from all robots without stopping them."""
+        """Disconnect from all robots without stopping them. Waits for replies end."""
+        with self._changed:
+            self._is_closed = True
+            self._changed.notify_all()
         self.set_robots(())
         for thread in self._opener_threads:
             thread.join(timeout=5)

@@ -85,7 +85,7 @@ class SimulatedClock:
     ) -> bool:
         """Wait for the event; return True if it is set, or False after the timeout.
 
-        Same interface as `app.robots.driver.call.Clock`. While `is_frozen` returns true, neither ends
+        Same interface as `app.clock.Clock`. While `is_frozen` returns true, neither ends
         the wait, because the process is halted.
         """
         condition = event._cond  # type: ignore[attr-defined]  # the only way to wake one wait without setting it
