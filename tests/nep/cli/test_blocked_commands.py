@@ -121,7 +121,7 @@ def test_command_with_paused_output_does_not_affect_unrelated_topics(
         before = len(command.text)
         with node.new_sub("/other") as heard, node.new_pub("/other") as pub:
             pub.publish("still")
-            assert heard.listen(LONG_S) == (True, "still")
+            assert heard.listen(timeout_s=LONG_S) == (True, "still")
         # The master still knows it.
         eventually(
             lambda: any(str(command.process.pid) in each.name for each in node.graph().nodes.values()), LONG_S
@@ -157,7 +157,7 @@ def test_master_with_blocked_output_keeps_serving() -> None:
             eventually(lambda: len(node.graph().alerts) == len(pairs), LONG_S)
             with node.new_sub("/still") as heard, node.new_pub("/still") as pub:
                 pub.publish("here")
-                assert heard.listen(LONG_S) == (True, "here")
+                assert heard.listen(timeout_s=LONG_S) == (True, "here")
             command.press(GO_ON)
             eventually(lambda: "“/19”" in command.look(), LONG_S)
         command.press(INTERRUPT)

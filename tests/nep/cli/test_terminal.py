@@ -180,7 +180,7 @@ def test_master_with_a_blocked_terminal_keeps_serving_and_exits(tmp_path: Path) 
             eventually(lambda: len(node.graph().alerts) == 20)
             heard, said = node.new_sub("/still"), node.new_pub("/still")
             said.publish("here")
-            assert heard.listen(30.0) == (True, "here")
+            assert heard.listen(timeout_s=30.0) == (True, "here")
         assert is_running(address, 30.0)
         process.send_signal(signal.SIGTERM)
         assert process.wait(60.0) == 0

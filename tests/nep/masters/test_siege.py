@@ -67,7 +67,7 @@ class Siege:
         for pub in self.pubs:
             pub.publish(self._said)
         for sub in self.subs:
-            assert [sub.listen(30.0) for _ in self.pubs] == [(True, self._said)] * 3
+            assert [sub.listen(timeout_s=30.0) for _ in self.pubs] == [(True, self._said)] * 3
             assert sub.lost == 0
         with nep.node("Guest", master=self._address) as guest:
             pub = guest.new_pub("/state")

@@ -125,9 +125,13 @@ def test_killed_publisher_does_not_delay_a_new_subscriber(node: nep.Node) -> Non
 
 
 def test_hung_subscriber_delays_the_first_publisher_once_and_is_reported(
-    node: nep.Node, request: pytest.FixtureRequest
+    request: pytest.FixtureRequest,
 ) -> None:
-    with running(COLLECT, "topic", "0", "2") as program:
+    with (
+        Master("127.0.0.1:0", learn_s=0.0, lease_s=60.0) as master,  # the hung node must stay registered
+        nep.node("tester", master=master.address) as node,
+        running(COLLECT, "topic", "0", "2", NEP_MASTER=master.address) as program,
+    ):
         program.line()
         program.stop()
         started = monotonic()

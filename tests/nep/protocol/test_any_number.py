@@ -147,7 +147,7 @@ def test_message_with_implausible_sequence_number_raises_an_alert_and_counts_no_
         sub = hearer.new_sub("/t", "bytes")
         pub = sayer.new_pub("/t", "bytes")
         pub.publish(b"1")
-        assert sub.listen(30.0) == (True, b"1")
+        assert sub.listen(timeout_s=30.0) == (True, b"1")
         context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         xpub = context.socket(zmq.XPUB)
         xpub.setsockopt(zmq.LINGER, 0)
@@ -163,10 +163,10 @@ def test_message_with_implausible_sequence_number_raises_an_alert_and_counts_no_
                 xpub.recv()
             for number in (1, seq):
                 xpub.send_multipart(wire.join("/t", wire.Header(3, 0, number, 1, 99), b"x"))
-            assert sub.listen(30.0) == (True, b"x")
+            assert sub.listen(timeout_s=30.0) == (True, b"x")
             eventually(lambda: sub.refused == 1)
             pub.publish(b"2")
-            assert sub.listen(30.0) == (True, b"2")
+            assert sub.listen(timeout_s=30.0) == (True, b"2")
             assert sub.lost == 0
             (alert,) = eventually_alerts(hearer)
             assert f"its sequence number jumps from 1 to {seq}" in alert
@@ -202,7 +202,7 @@ def test_reply_that_cannot_be_encoded_fails_without_affecting_other_replies(
         master.submit(AddPublisher(node, PublisherRecord(5, "/odd", odd, "json", ("tcp://127.0.0.1:9",))))
         pub = other.new_pub("/still")
         pub.publish("here")
-        assert still.listen(30.0) == (True, "here")
+        assert still.listen(timeout_s=30.0) == (True, "here")
         with pytest.raises(nep.RequestRefusedError, match=r"the master .*its log"):
             honest.graph()
         assert sub.lost == 0
