@@ -548,6 +548,22 @@ def test_truncated_reference_of_a_reading_publisher_is_rejected(node: nep.Node) 
     assert sub.refused == 3
 
 
+@pytest.mark.parametrize("size", [2**63, 2**20, LARGE + 1])
+def test_payload_size_beyond_its_sample_is_not_read(size: int) -> None:
+    publisher = next(_ids)
+    writer = SharedWriter(publisher)
+    assert writer.prepare(LARGE)
+    reader = SharedReader(publisher, writer.generation)
+    loan = writer.loan(LARGE)
+    assert loan is not None
+    loan.size = size  # what the header of the sample claims
+    assert writer.send(loan) == 1
+    assert reader.read(1) is None
+    assert writer.copy(b"x" * LARGE, LARGE) == 2
+    assert bytes(reader.read(2) or b"") == b"x" * LARGE
+    writer.close()
+
+
 def test_opening_missing_memory_raises_lookup_error() -> None:
     with pytest.raises(LookupError):
         SharedReader(next(_ids), 1)

@@ -415,8 +415,12 @@ class SharedReader:
             return None
         if sample is None:
             return None
+        sample_bytes = sample.header.number_of_elements
+        if sample_bytes < _HEADER_BYTES:
+            return None
         number, size = _HEADER.unpack_from(self._slots.view(int(sample.payload_ptr), _HEADER.size))
-        return number, size, sample
+        # a larger size would read beyond the memory, which ends the program
+        return (number, size, sample) if size <= sample_bytes - _HEADER_BYTES else None
 
     def _extract_payload(self, size: int, sample: Any, *, may_copy: bool) -> bytes | memoryview:  # noqa: ANN401
         address = int(sample.payload_ptr)
