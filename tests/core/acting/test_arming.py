@@ -37,6 +37,16 @@ def test_arming_expires_and_sending_does_not_extend_it() -> None:
     assert not arming.run_if_armed(arming.turn, TOPIC, lambda: None)
 
 
+def test_remaining_time_never_exceeds_the_duration() -> None:
+    for hundredths in range(5000):
+        arming, now = made()
+        now[0] = 1000 + hundredths / 100
+        arming.arm(300)
+        assert arming.remaining_s == 300
+        now[0] += 0.1
+        assert 299 < arming.remaining_s < 300
+
+
 def test_request_of_previous_arming_is_rejected_after_rearming() -> None:
     arming, _now = made()
     arming.arm()

@@ -28,7 +28,7 @@ class Arming:
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
         self._lock = threading.RLock()
-        self._end_s = 0.0
+        self._start_s = self._duration_s = 0.0
         self._is_on = False
         self._targets: tuple[Target, ...] = ()
         self._confirmed_topics: frozenset[str] = frozenset()
@@ -40,17 +40,19 @@ class Arming:
     @property
     def is_on(self) -> bool:
         """True if sending is allowed now."""
-        return self._is_on and self._clock() < self._end_s
+        return self.remaining_s > 0
 
     @property
     def has_expired(self) -> bool:
         """True if the time has elapsed and `disarm` has not been called since then."""
-        return self._is_on and self._clock() >= self._end_s
+        return self._is_on and self.remaining_s <= 0
 
     @property
     def remaining_s(self) -> float:
-        """Remaining time in seconds; 0 if sending is off."""
-        return max(0.0, self._end_s - self._clock()) if self._is_on else 0.0
+        """Remaining time in seconds, at most the duration given to `arm`; 0 if sending is off."""
+        # start + duration - now can exceed the duration by a rounding error, and the window rounds up.
+        elapsed_s = self._clock() - self._start_s
+        return max(0.0, self._duration_s - elapsed_s) if self._is_on else 0.0
 
     @property
     def targets(self) -> tuple[Target, ...]:
@@ -72,7 +74,7 @@ class Arming:
                 self._targets, self._confirmed_topics = (), frozenset()
                 self.turn += 1
             self._is_on = True
-            self._end_s = self._clock() + min(MAX_ARMED_S, max(MIN_ARMED_S, seconds))
+            self._start_s, self._duration_s = self._clock(), min(MAX_ARMED_S, max(MIN_ARMED_S, seconds))
             self.revision += 1
 
     def allow(self, target: Target, *, is_confirmed: bool = False) -> bool:
