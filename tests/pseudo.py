@@ -40,6 +40,12 @@ NAMES = frozenset({
 })  # fmt: skip
 """Proper names and names of keys, which are the same in every language."""
 
+_GAP = r"(?:\s|#.*\n)*"
+_STRING = r'''[rRuU]?(?:"""(?:\\[\s\S]|[^\\])*?"""|"(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])*')'''
+_TEXT = rf"{_STRING}(?:{_GAP}{_STRING})*"
+_CALL = re.compile(  # parsing all sources with ast takes nine times as long
+    rf"(?<![\w.])({'|'.join(MARKS)})\({_GAP}({_TEXT}){_GAP}(?:,{_GAP}({_TEXT}){_GAP})?(?=[,)])"
+)
 _WORD = re.compile(r"[A-Za-z][A-Za-z']+")
 _TAG = re.compile(r"<[^<>]*>|&[a-z]+;")
 _PATTERN = {"2": "[{0} àñđ {1}]", "start": "{0}, {1}", "middle": "{0}, {1}", "end": "[{0} àñđ {1}]"}
@@ -82,17 +88,10 @@ def marked() -> frozenset[tuple[str | None, str]]:
 
 
 def _marked_in(source: str) -> Iterator[tuple[str | None, str]]:
-    if not any(f"{mark}(" in source for mark in MARKS):
-        return
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in MARKS:
-            given = [
-                each.value
-                for each in node.args[: MARKS[node.func.id]]
-                if isinstance(each, ast.Constant) and isinstance(each.value, str)
-            ]
-            if len(given) == MARKS[node.func.id]:
-                yield (None, given[0]) if len(given) == 1 else (given[0], given[1])
+    for mark, *literals in _CALL.findall(source):
+        given = [ast.literal_eval(f"({each})") for each in literals if each][: MARKS[mark]]
+        if len(given) == MARKS[mark]:
+            yield (None, given[0]) if len(given) == 1 else (given[0], given[1])
 
 
 def untranslated(text: str, *data: str) -> list[str]:
