@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import cv2
 
@@ -18,11 +18,12 @@ from app.robots.diffdrive import DIFFDRIVE, DiffDrive
 from app.robots.driver.call import Link
 from app.robots.driver.process import main as drive
 from app.robots.virtual.camera import Camera
+from app.robots.virtual.canvas import Picture
 from app.robots.virtual.lens import Lens
-from app.robots.virtual.room import OtherRobot
+from app.robots.virtual.room import OtherRobot, Room
 from app.robots.virtual.shared_room import SharedRoom
 from app.robots.virtual.simulation import ROBOT_ITSELF, Ticker, is_valid_event, parse_event, room_state
-from app.robots.virtual.vision import colours_in
+from app.robots.virtual.vision import ColourPatch, colours_in
 from app.robots.virtual.wheels import HEIGHT, RADIUS, WheelBody
 
 VIRTUAL_ROBOT = ("diffdrive", "Turtle")
@@ -32,6 +33,16 @@ _MAX_STEP_S = 0.25
 _EYE_HEIGHT_M = 0.22
 _EYE_PITCH_DEG = -6.0
 _JOIN_TIMEOUT_S = 2.0
+
+
+@dataclass(frozen=True)
+class _CameraView:
+    """Cached image from one position, reused until the room or the position changes."""
+
+    room: Room
+    lens: Lens
+    image: Picture
+    colours: Mapping[str, ColourPatch]
 
 
 class VirtualWheels:
@@ -49,6 +60,7 @@ class VirtualWheels:
         self._lock = threading.Lock()
         self._ended = self._clock.event()
         self._camera = Camera(self.body.room)
+        self._view: _CameraView | None = None
         self._visible_colours: set[str] = set()
         appearance = OtherRobot(link.name, 0.0, 0.0, 0.0, RADIUS, HEIGHT, "turtle")
         self._shared = SharedRoom(link, self.body, self._lock, appearance)
@@ -110,16 +122,20 @@ class VirtualWheels:
                 self._advance_locked()
                 events = list(self.body.events)
                 self.body.events.clear()
-                state, distance = self._drawing_state(), self.body.distance
+                state = self._drawing_state() if step % _STATE_PERIOD_STEPS == 0 else None
+                slow_values = (
+                    (self.body.distance, self.body.pressed_bumper) if step % _SLOW_PERIOD_STEPS == 0 else None
+                )
             for event in events:
                 self._link.happen(event.name, **event.data)
-            if step % _STATE_PERIOD_STEPS == 0:
+            if state is not None:
                 self._shared.publish_changes()
                 self._link.publish_value("state", state)
                 self._link.sense("pose", {"x": state["x"], "y": state["y"], "theta": state["theta_deg"]})
-            if step % _SLOW_PERIOD_STEPS == 0:
+            if slow_values is not None:
+                distance, pressed_bumper = slow_values
                 self._link.sense("distance", round(distance, 2))
-                self._link.sense("bumper", bool(state["bumped"]))
+                self._link.sense("bumper", bool(pressed_bumper))
             if step % _BATTERY_PERIOD_STEPS == 0:
                 self._link.sense("battery", int(self.body.battery))
 
@@ -154,10 +170,13 @@ class VirtualWheels:
             with self._lock:
                 body = self.body
                 room, lens = body.room, Lens((body.x, body.y, _EYE_HEIGHT_M), body.theta_deg, _EYE_PITCH_DEG)
-            image = self._camera.picture(room, lens)
+            if self._view is None or (self._view.room, self._view.lens) != (room, lens):
+                image = self._camera.picture(room, lens)
+                image.flags.writeable = False  # reused until something moves
+                self._view = _CameraView(room, lens, image, colours_in(image))
             if is_watched:
-                self._link.sense("camera", image)
-            colours = colours_in(image)
+                self._link.sense("camera", self._view.image)
+            colours = self._view.colours
             for name in colours.keys() - self._visible_colours:
                 self._link.happen("colour", name=name, x=colours[name].x, area=colours[name].area)
             self._visible_colours = set(colours)

@@ -13,6 +13,7 @@ import sys
 import textwrap
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Literal, TypeAlias, TypeVar
 
@@ -397,7 +398,7 @@ class Kind:
             raise DescriptionError(self.model, problems)
         object.__setattr__(self, "thing_model", thing_model)
 
-    @property
+    @cached_property
     def actions(self) -> dict[str, ActionSpec]:
         """Declared actions by name of the method, in the order of declaration."""
         return {
@@ -406,12 +407,12 @@ class Kind:
             if hasattr(member, _ACTION_ATTRIBUTE)
         }
 
-    @property
+    @cached_property
     def sensors(self) -> dict[str, SensorSpec]:
         """Declared sensors by name, in the order of declaration."""
         return {name: member for name, member in self._members() if isinstance(member, SensorSpec)}
 
-    @property
+    @cached_property
     def events(self) -> dict[str, EventSpec]:
         """Declared events by name, in the order of declaration."""
         return {name: member for name, member in self._members() if isinstance(member, EventSpec)}
