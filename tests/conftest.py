@@ -18,7 +18,7 @@ from xdist.workermanage import WorkerController
 
 from nep.masters.master import Master
 from nep.text import escaped
-from tests import leftovers, long_groups
+from tests import examples, leftovers, long_groups
 from tests.nep.meeting import extend_handshakes
 from tests.scheduler import FileScheduling
 
@@ -29,11 +29,6 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 # Python 3.12 and later warn about forks in processes with threads; the fork tests cover this.
 os.environ["PYTHONWARNINGS"] = "ignore:This process:DeprecationWarning"
-# No deadline: on a busy computer, generating a value or running an example may be slow.
-hypothesis.settings.register_profile(
-    "nep", hypothesis.settings(), deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]
-)
-hypothesis.settings.load_profile("nep")
 pytest.register_assert_rewrite("tests.robots.message_senders")  # shared contract tests
 os.environ["NEP_LANG"] = "en"  # tests compare English texts, whatever the system language
 _GRACE_S = 20.0
@@ -60,6 +55,20 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         # Without pytest-qt (dev.py versions), its options must still be accepted; they have no effect.
         for name in ("qt_api", "qt_log_level_fail", "qt_log_ignore"):
             parser.addini(name, "an option of pytest-qt, which is not installed", type="linelist")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Set the number of examples of property tests."""
+    examples.is_long = config.getoption("--long")
+    # No deadline: on a busy computer, generating a value or running an example may be slow.
+    hypothesis.settings.register_profile(
+        "nep",
+        hypothesis.settings(),
+        deadline=None,
+        max_examples=examples.examples(examples.DEFAULT_EXAMPLES),
+        suppress_health_check=[hypothesis.HealthCheck.too_slow],
+    )
+    hypothesis.settings.load_profile("nep")
 
 
 def _selected(config: pytest.Config) -> tuple[tuple[str, ...], str | None]:

@@ -21,6 +21,7 @@ from app.robots.description.inputs import check_input, format_for_editing, param
 from nep.errors import NepError
 from nep.messages.message import UNDECODED, Message
 from nep.text import first_control
+from tests.examples import examples
 
 MODELS = sorted(resources.path("robots").glob("*.tm.jsonld"))
 
@@ -196,7 +197,7 @@ def places(value: object, path: tuple[object, ...] = ()) -> list[tuple[object, .
 PLACES = places(model("pepper"))
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=examples(300), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(st.tuples(st.sampled_from(PLACES), json_values), min_size=1, max_size=3))
 def test_corrupt_description_never_crashes(changes):
     document = copy.deepcopy(model("pepper"))
@@ -220,13 +221,13 @@ def test_corrupt_description_never_crashes(changes):
             action.check({parameter.name: 10**400 for parameter in action.parameters})
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 @given(json_values)
 def test_arbitrary_json_is_reported_as_invalid_description(value):
     assert validate(value) != ()
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(100), deadline=None)
 @given(st.dictionaries(st.text(max_size=8), json_values, max_size=4))
 def test_arbitrary_input_is_checked_without_crash(value):
     for action in parse(model("pepper")).actions:

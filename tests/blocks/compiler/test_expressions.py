@@ -19,6 +19,7 @@ from app.blocks.runtime.runtime import Runtime
 from app.blocks.runtime.values import grapheme_clusters
 from app.blocks.runtime.values import text as as_text
 from tests.blocks.samples import block, boolean, list_of, number, started, text, workspace, write
+from tests.examples import examples
 
 ARITHMETIC = {
     "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv, "%": operator.mod,
@@ -162,7 +163,7 @@ def small(tree):
 
 @pytest.mark.timeout(180)  # a thousand programs; a busy computer may need more than a minute
 @settings(
-    max_examples=1000,
+    max_examples=examples(1000),
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
 )

@@ -19,6 +19,7 @@ from app.blocks.toolbox.definitions import editor_definitions
 from app.errors import DescriptionError
 from app.robots.description.description import parse, thing_description
 from tests.blocks.samples import MODEL, block, robot, stack, started, workspace
+from tests.examples import examples
 
 CATALOGUE = Catalogue([robot()])
 TYPES = sorted(CATALOGUE.blocks)
@@ -92,7 +93,9 @@ def filled(draw, described, depth: int) -> dict[str, object]:
 
 
 @settings(
-    max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large]
+    max_examples=examples(200),
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
 )
 @given(st.lists(blocks(), max_size=4), texts, st.lists(texts, max_size=3))
 def test_generated_program_calls_only_known_functions(tops, name, variables):
@@ -126,7 +129,7 @@ def check(text: str) -> None:
         assert not isinstance(node, (ast.Import, ast.ClassDef, ast.AsyncFunctionDef, ast.Await, ast.Starred))
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 @given(texts, texts, texts, texts)
 def test_hostile_robot_description_is_never_executed(action, parameter, words, robot_name):
     wave = {

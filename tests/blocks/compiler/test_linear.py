@@ -21,7 +21,7 @@ from app.core.projects.problems import problem_lines
 from tests.blocks.samples import block, call, define, number, robot, say, started, workspace
 
 Saved = dict[str, object]
-FEW = 60
+FEW = 20
 
 
 def steps(work: Callable[[], object]) -> int:
@@ -103,4 +103,4 @@ def test_time_to_list_problems_is_linear_in_number_of_missing_robots() -> None:
         return steps(lambda: problem_lines(problems, pages, missing, (here,), ()))
 
     work(2)
-    assert work(4 * 20) < 5 * work(20)
+    assert work(4 * 10) < 5 * work(10)

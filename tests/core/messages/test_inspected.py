@@ -21,6 +21,7 @@ from app.core.messages.inspected import NO_BASE, InspectedMessage, View
 from app.core.messages.reader import MessageReader, ReadResult, read
 from app.core.network.topics import Topic
 from nep.messages.message import Message
+from tests.examples import examples
 
 TOPIC = "/a"
 LIMIT = 64
@@ -468,6 +469,6 @@ class InspectorModel(RuleBasedStateMachine):
 
 def test_view_is_consistent_after_any_messages_and_user_actions() -> None:
     options = settings(
-        max_examples=200, stateful_step_count=30, deadline=None, derandomize=True, database=None
+        max_examples=examples(200), stateful_step_count=30, deadline=None, derandomize=True, database=None
     )
     run_state_machine_as_test(InspectorModel, settings=options)

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from app.core.messages import lazy_json
 from app.core.messages.lazy_json import JsonIndex, LazyList, LazyObject, UnreadableValue
+from tests.examples import examples
 
 TEXTS = st.text(alphabet=st.sampled_from('ab"\\{}[],: \n\u00e9\u20ac'), max_size=12)
 NUMBERS = st.integers(-(2**53), 2**53) | st.floats(allow_nan=False, allow_infinity=False)
@@ -36,7 +37,7 @@ def index(text: str) -> JsonIndex:
     return JsonIndex(memoryview(text.encode()))
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 @given(VALUES, st.sampled_from([None, 1]), st.sampled_from([7, 64, 1 << 20]))
 def test_lazy_json_equals_full_decoding(value: object, indent: int | None, chunk: int) -> None:
     text = json.dumps([value], indent=indent, ensure_ascii=False)

@@ -16,6 +16,7 @@ from app.core.messages.picture import decode, encode_png
 from nep.errors import DecodeError, EncodeError, NepError
 from nep.messages import image_files
 from nep.messages.message import Message
+from tests.examples import examples
 
 
 def message(data: bytes, **extension: object) -> Message:
@@ -240,7 +241,7 @@ SENT = (
     st.fixed_dictionaries({}, optional={"encoding": KINDS | ANYTHING, "shape": SHAPES | ANYTHING}),
     st.none() | st.tuples(st.integers(0, 5000), st.integers(0, 5000)),
 )
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=examples(400), deadline=None)
 def test_arbitrary_data_is_decoded_or_rejected_with_error_message(data, extension, fit) -> None:
     with patch.object(image_files, "MAX_PIXELS", 1_000_000):  # one byte can give 100 million pixels: slow
         look_at_a_picture(data, extension, fit)

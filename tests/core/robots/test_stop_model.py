@@ -32,7 +32,7 @@ from tests.core.robots.stop_model.robots import SimulatedRobot
 from tests.core.robots.stop_model.studio import GRAPH_POLL_S, SimulatedBridge
 
 HISTORIES = int(os.environ.get("NEP_STOP_HISTORIES", "0"))
-FIXED_HISTORIES, LONG_FIXED_HISTORIES = 300, 2000
+FIXED_HISTORIES, LONG_FIXED_HISTORIES = 80, 2000
 STEPS = 10
 NAMES = ("Arm", "Base")
 REACT_S = 0.5

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from app.core.series.formula import ExpressionSource, FieldSource, WindowSource, parse
 from app.errors import CurveError
+from tests.examples import examples
 
 TOPICS = ["/a", "/a/b", "/odom", "/cmd.vel", "ros2 /odom"]
 
@@ -116,7 +117,7 @@ def test_invalid_formula_is_rejected_with_reason(text, said) -> None:
     assert said in str(told.value)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(st.text(alphabet="/odomax.[]*(),+-^%0123456789 s_'\"=:lambdaimport\n\\", max_size=60))
 def test_any_formula_text_is_parsed_or_rejected(text) -> None:
     try:

@@ -10,6 +10,7 @@ from app.robots.virtual.body import MIN_TOUCH_S, RADIUS, Body
 from app.robots.virtual.motion import Joint, Motion
 from app.robots.virtual.room import Room
 from app.robots.virtual.simulation import drawing_state
+from tests.examples import examples
 
 STEP = 1 / 30
 
@@ -198,7 +199,7 @@ def test_drawing_state_has_position_speech_touches_and_objects():
     assert drawn["room"]["x_max"] == 3.0
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(
     st.lists(st.tuples(st.sampled_from(["walk", "turn"]), st.floats(-2, 2), st.floats(0.1, 2)), max_size=6)
 )

@@ -13,6 +13,7 @@ from app.blocks.runtime.pure import lists
 from app.blocks.runtime.values import MAX_TEXT_LENGTH
 from tests.blocks.fakes import play
 from tests.blocks.samples import block, get, list_of, number, started, text, workspace, write
+from tests.examples import examples
 
 FRUITS = list_of(text("apple"), text("pear"), text("fig"))
 
@@ -93,7 +94,7 @@ def test_list_is_copied_when_added_to_itself_and_list_size_is_limited() -> None:
             act(mine)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 @given(st.lists(st.text(max_size=4)), st.text(min_size=1, max_size=2))
 def test_joining_the_split_parts_restores_the_text(items, between) -> None:
     whole = lists.join_items(items, between)
@@ -105,7 +106,7 @@ operations = st.lists(
 )
 
 
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=examples(500), deadline=None)
 @given(operations)
 def test_list_changes_match_reference_implementation(steps) -> None:
     """The reference uses indices from 0 and raises no errors."""
