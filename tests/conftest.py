@@ -7,6 +7,7 @@ import gc
 import importlib.util
 import os
 import signal
+import sys
 import time
 from collections.abc import Generator, Iterator
 
@@ -186,6 +187,17 @@ def _restore_fault_handler(pytestconfig: pytest.Config) -> Iterator[None]:
     stderr = pytestconfig.stash.get(fault_handler_stderr_fd_key, None)  # pytest's copy of the real stderr
     if stderr is not None:
         faulthandler.enable(stderr)
+
+
+@pytest.fixture(autouse=True)
+def _restore_recursion_limit() -> Iterator[None]:
+    """Restore the recursion limit, which a program's runtime raises for its process.
+
+    With a higher limit, indenting JSON with deep nesting takes many times as long before it fails.
+    """
+    limit = sys.getrecursionlimit()
+    yield
+    sys.setrecursionlimit(limit)
 
 
 @pytest.fixture

@@ -1,7 +1,8 @@
-"""Tests of programs with a virtual robot in virtual time: minutes of a behaviour without waiting."""
+"""Tests of programs with a virtual robot in virtual time: a minute of a behaviour without waiting."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import cast
@@ -13,7 +14,8 @@ from hypothesis import strategies as st
 import nep
 from app.blocks.compiler.compiler import compile_behaviour
 from app.blocks.runtime.network import Network
-from app.blocks.runtime.runtime import Runtime
+from app.blocks.runtime.runtime import CallStack, Runtime
+from app.blocks.runtime.scheduler import Scheduler
 from app.blocks.runtime.trace import AnyRecord, BlockBegan, BlockEnded
 from app.clock import VirtualClock
 from app.robots import simulated, turtle
@@ -26,6 +28,15 @@ from tests.blocks.samples import block, boolean, number, stack, started, text, w
 LONG_S = 100.0  # real seconds; the programs take longer in virtual time
 TURN_SPEED = 40.0  # °/s; default of the action
 SNAP_S = 0.15  # a motion ends early, because it snaps to its target
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _raised_recursion_limit() -> Iterator[None]:
+    """Raise the recursion limit as a program does, because Hypothesis rejects a change during its test."""
+    limit = sys.getrecursionlimit()
+    CallStack(Scheduler()).raise_recursion_limit()
+    yield
+    sys.setrecursionlimit(limit)
 
 
 class Rehearsal:
