@@ -146,9 +146,14 @@ def play(workspace: Mapping[str, object], link: FakeLink | None = None) -> Play:
     return Play(program, (pepper,), link, clock=VirtualClock()).start().end()
 
 
+_MIN_POLL_INTERVAL_S, _MAX_POLL_INTERVAL_S = 0.002, 0.01
+
+
 def until(ready: Callable[[], bool], timeout_s: float = LONG_S) -> None:
     """Wait until a condition holds; fail after `timeout_s` seconds."""
     waiting, deadline = threading.Event(), time.monotonic() + timeout_s
+    interval_s = _MIN_POLL_INTERVAL_S
     while not ready():
         assert time.monotonic() < deadline, "it has not happened"
-        waiting.wait(0.002)
+        waiting.wait(interval_s)
+        interval_s = min(1.2 * interval_s, _MAX_POLL_INTERVAL_S)

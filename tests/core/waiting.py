@@ -9,6 +9,8 @@ from collections.abc import Callable
 from app.core.session import Session
 from tests.blocks.wire_robot import usual_time_limits
 
+_TICK_INTERVAL_S = 1 / 30  # as in Studio
+
 
 def tick_until(session: Session, true: Callable[[], object], timeout_s: float = 60.0) -> None:
     """Tick the session until ``true()`` is truthy; fail after ``timeout_s`` seconds."""
@@ -17,7 +19,7 @@ def tick_until(session: Session, true: Callable[[], object], timeout_s: float = 
     session.tick()
     while not true():
         assert time.monotonic() < end, "it never came true"
-        pause.wait(0.01)
+        pause.wait(_TICK_INTERVAL_S)
         session.tick()
 
 

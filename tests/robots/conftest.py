@@ -28,14 +28,17 @@ from app.robots.kit import (
     sensor,
 )
 
+_MIN_POLL_INTERVAL_S, _MAX_POLL_INTERVAL_S = 0.002, 0.01
+
 
 def eventually(true: Callable[[], object], timeout_s: float = 60.0) -> None:
     """Wait until `true()` is true; fail after `timeout_s` seconds."""
     never = threading.Event()
-    end = time.monotonic() + timeout_s
+    end, interval_s = time.monotonic() + timeout_s, _MIN_POLL_INTERVAL_S
     while not true():
         assert time.monotonic() < end, "it never came true"
-        never.wait(0.002)
+        never.wait(interval_s)
+        interval_s = min(1.2 * interval_s, _MAX_POLL_INTERVAL_S)
 
 
 class Turtle:
