@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
+from functools import lru_cache
 
 from app.robots.description.description import Robot, parse, thing_description
+from nep.i18n import language
 
 
 def _block(category: str, icon: str, text: str, says: str | None = None) -> dict[str, object]:
@@ -166,8 +168,13 @@ MODEL: dict[str, object] = {
 
 
 def robot(name: str = "Pepper", **changes: object) -> Robot:
-    """Return a connected robot with this name."""
-    return parse(thing_description(MODEL | changes, name))
+    """Return a connected robot with this name; without changes it is parsed once."""
+    return parse(thing_description(MODEL | changes, name)) if changes else _robot(name, language())
+
+
+@lru_cache(maxsize=64)
+def _robot(name: str, _language: str) -> Robot:
+    return parse(thing_description(MODEL, name))
 
 
 def nao(name: str = "NAO") -> Robot:

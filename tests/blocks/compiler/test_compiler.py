@@ -309,9 +309,9 @@ def test_variable_is_set_changed_and_read_in_a_script():
 
 
 def test_long_script_and_35_nested_blocks_compile_and_200_nested_blocks_are_an_error():
-    long_ = compile_behaviour(workspace(started(*(say(f"{n}") for n in range(3000)))), [robot()])
+    long_ = compile_behaviour(workspace(started(*(say(f"{n}") for n in range(1500)))), [robot()])
     assert not long_.problems
-    assert long_.source.count("'say'") == 3000
+    assert long_.source.count("'say'") == 1500
 
     deep = number(1)
     for _ in range(200):

@@ -89,8 +89,8 @@ def ticking_s(session: Session, publisher: nep.Publisher, data: bytes, sent: int
     return worked
 
 
-def test_100_000_malformed_messages_are_all_counted(session: Session, talker: nep.Node) -> None:
-    sent = 100_000
+def test_30_000_malformed_messages_are_all_counted(session: Session, talker: nep.Node) -> None:
+    sent = 30_000
     with session.live.watch("/good"):
         good_s = ticking_s(session, publisher_of(session, talker, "/good"), GOOD, sent)
     with session.live.watch("/bad"):
@@ -150,11 +150,11 @@ def test_messages_of_50_mb_are_received_or_counted_as_lost(session: Session, tal
         assert newest.size_bytes == len(data)
 
 
-def test_publisher_can_restart_100_times(session: Session, master: Master) -> None:
+def test_publisher_can_restart_30_times(session: Session, master: Master) -> None:
     threads = threading.active_count()
     with session.live.watch("/phoenix"):
         sent = 0
-        for life in range(100):
+        for life in range(30):
             node = nep.node("phoenix", master=master.address)
             publisher = node.new_pub("/phoenix", "json")
             publisher.publish({"life": life})

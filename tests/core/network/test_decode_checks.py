@@ -44,7 +44,7 @@ def test_every_message_is_checked_and_newest_error_is_reported() -> None:
     assert checks.pop_results() == {}
 
 
-def test_100_000_malformed_messages_are_counted_as_bad_or_unchecked() -> None:
+def test_20_000_malformed_messages_are_counted_as_bad_or_unchecked() -> None:
     began = time.thread_time()
     for message in (some := messages(*[BAD] * 5000)):
         with pytest.raises(NepError):
@@ -52,9 +52,9 @@ def test_100_000_malformed_messages_are_counted_as_bad_or_unchecked() -> None:
     each_s = (time.thread_time() - began) / len(some)
     checks = DecodeChecker()  # real clocks, because the limit is on real processor time
     for _ in range(10):
-        checks.check("/a", messages(*[BAD] * 10_000))
+        checks.check("/a", messages(*[BAD] * 2000))
     found = checks.pop_results()["/a"]
-    assert found.bad_count + found.unchecked_count == 100_000
+    assert found.bad_count + found.unchecked_count == 20_000
     assert not found.is_newest_readable
     # A slow machine may leave some unchecked, but only after using a good part of the time budget.
     assert found.unchecked_count == 0 or found.checked_count * each_s > 0.3 * module.MAX_BUDGET_S

@@ -147,19 +147,20 @@ def test_unknown_file_content_is_preserved_on_save(tmp_path: Path) -> None:
 
 @posix
 @pytest.mark.timeout(240)
-def test_file_is_intact_after_100_kills_while_saving(tmp_path: Path) -> None:
+def test_file_is_intact_after_kills_while_saving(tmp_path: Path, pytestconfig: pytest.Config) -> None:
+    kills = 100 if pytestconfig.getoption("--long") else 25
     path = tmp_path / "Mine.nepb"
     behaviour(path, {"type": "events_started", "id": "first"})
     dice = random.Random(9)
-    lives = "".join(f"{dice.randint(0, 2)} {dice.randint(0, 60)}\n" for _ in range(100))
+    lives = "".join(f"{dice.randint(0, 2)} {dice.randint(0, 60)}\n" for _ in range(kills))
     done = subprocess.run(
         [sys.executable, "-m", "tests.core.saving", path, tmp_path / "journal"],
         input=lives, capture_output=True, text=True, timeout=200, check=True, cwd=ROOT,
     )  # fmt: skip
     told = done.stdout.splitlines()
-    assert len(told) == 100
+    assert len(told) == kills
     assert [line for line in told if not line.startswith("whole ")] == []
-    assert len(set(told)) > 5, "it was saved in between"
+    assert len(set(told)) > kills // 20, "it was saved in between"
     assert path.stat().st_size > 0
     journals = list((tmp_path / "journal").glob("*.json"))
     assert journals, "some died between an edit and its save"
