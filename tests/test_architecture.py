@@ -11,8 +11,7 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator
-from functools import cache
+from collections.abc import Iterable
 from importlib import import_module
 from importlib.metadata import distribution
 from pathlib import Path
@@ -22,6 +21,9 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.version import Version
 
+from tests import syntax
+
+pytestmark = pytest.mark.usefixtures("syntax_trees")
 ROOT = Path(__file__).parents[1]
 # From top to bottom: a module may import from its own line and the lines below.
 LAYERS = (
@@ -55,7 +57,7 @@ class Module(NamedTuple):
     tree: ast.Module
 
 
-@cache
+@syntax.cached
 def modules() -> tuple[Module, ...]:
     """Return every module of nep and app."""
     found = []
@@ -64,21 +66,25 @@ def modules() -> tuple[Module, ...]:
             continue
         parts = path.relative_to(ROOT).with_suffix("").parts
         name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-        found.append(Module(name, path, ast.parse(path.read_text(encoding="utf-8"), str(path))))
+        found.append(Module(name, path, syntax.parse(path)))
     return tuple(found)
 
 
-def imports(tree: ast.AST, in_function: bool = False) -> Iterator[Import]:
-    """Yield every import below a node with its dotted name; ``from a import b`` gives ``a.b``."""
-    for node in ast.iter_child_nodes(tree):
-        if isinstance(node, ast.Import):
-            for alias in node.names:
-                yield Import(alias.name, node.lineno, in_function)
-        elif isinstance(node, ast.ImportFrom):
-            for alias in node.names:
-                yield Import(f"{node.module}.{alias.name}", node.lineno, in_function)
-        else:
-            yield from imports(node, in_function or isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef))
+@syntax.cached
+def imports(tree: ast.Module) -> tuple[Import, ...]:
+    """Return every import of a module with its dotted name; ``from a import b`` gives ``a.b``."""
+    functions = [*syntax.nodes(tree, ast.FunctionDef), *syntax.nodes(tree, ast.AsyncFunctionDef)]
+    lines = {line for each in functions for line in range(each.lineno, (each.end_lineno or 0) + 1)}
+    plain = [
+        Import(alias.name, node.lineno, node.lineno in lines)
+        for node in syntax.nodes(tree, ast.Import)
+        for alias in node.names
+    ]
+    return tuple(plain) + tuple(
+        Import(f"{node.module}.{alias.name}", node.lineno, node.lineno in lines)
+        for node in syntax.nodes(tree, ast.ImportFrom)
+        for alias in node.names
+    )
 
 
 def layer(name: str) -> int | None:
@@ -101,17 +107,14 @@ def faults_of_layers(module: Module) -> list[str]:
     return found
 
 
-def sleeps(tree: ast.AST) -> list[int]:
+def sleeps(tree: ast.Module) -> list[int]:
     """Return the lines that call ``x.sleep()``, ``sleep()``, ``msleep`` or ``usleep``."""
     names = {"sleep", "msleep", "usleep"}
     return [
         node.lineno
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Call)
-        and (
-            (isinstance(node.func, ast.Attribute) and node.func.attr in names)
-            or (isinstance(node.func, ast.Name) and node.func.id in names)
-        )
+        for node in syntax.nodes(tree, ast.Call)
+        if (isinstance(node.func, ast.Attribute) and node.func.attr in names)
+        or (isinstance(node.func, ast.Name) and node.func.id in names)
     ]
 
 
@@ -197,8 +200,8 @@ def classes_with_two_meanings(found: Iterable[Module]) -> dict[str, list[str]]:
     """Return the public class names that are defined more than once, with their places."""
     places: dict[str, list[str]] = {}
     for module in found:
-        for node in ast.walk(module.tree):
-            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+        for node in syntax.nodes(module.tree, ast.ClassDef):
+            if not node.name.startswith("_"):
                 places.setdefault(node.name, []).append(f"{module.name}:{node.lineno}")
     return {name: where for name, where in places.items() if len(where) > 1}
 
@@ -221,8 +224,8 @@ def test_no_code_calls_sleep() -> None:
         f"{path.relative_to(ROOT)}:{line}"
         for path in paths
         if "node_modules" not in path.parts
-        if "sleep" in (text := path.read_text(encoding="utf-8"))
-        for line in sleeps(ast.parse(text))
+        if "sleep" in path.read_text(encoding="utf-8")
+        for line in sleeps(syntax.parse(path))
     ]
     assert faults == []
 
@@ -239,9 +242,8 @@ def processes_with_a_console(tree: ast.Module) -> list[int]:
     starts = {"Popen", "run", "call", "check_call", "check_output"}
     return [
         node.lineno
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Call)
-        and isinstance(node.func, ast.Attribute)
+        for node in syntax.nodes(tree, ast.Call)
+        if isinstance(node.func, ast.Attribute)
         and isinstance(node.func.value, ast.Name)
         and (node.func.value.id, node.func.attr) in {("subprocess", name) for name in starts}
         and "creationflags" not in {word.arg for word in node.keywords}
@@ -259,12 +261,12 @@ def places_that_replace_files(tree: ast.AST) -> list[int]:
     """Return the lines that replace or rename a file; ``replace`` with two arguments is a method of `str`."""
     return [
         node.lineno
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Call)
-        and isinstance(node.func, ast.Attribute)
+        for node in syntax.nodes(tree, ast.Call)
+        if isinstance(node.func, ast.Attribute)
+        and node.func.attr in {"replace", "rename", "renames"}
         and (
             ast.unparse(node.func) in {"os.replace", "os.rename", "os.renames"}
-            or (node.func.attr in {"replace", "rename"} and len(node.args) == 1 and not node.keywords)
+            or (node.func.attr != "renames" and len(node.args) == 1 and not node.keywords)
         )
     ]
 

@@ -10,6 +10,7 @@ import pytest
 import nep
 from tools import reference
 
+pytestmark = pytest.mark.usefixtures("syntax_trees")
 INTERNAL = re.compile(
     r"\bnep\.(nodes|backends|system|patterns|protocol|masters|messages|programs|cli)\b|\b_[a-z]\w+|ParameterHost"
 )
@@ -21,7 +22,13 @@ def book() -> reference.Reference:
     return reference.reference()
 
 
-def test_reference_pages_are_up_to_date() -> None:
+@pytest.fixture(scope="module")
+def pages(book: reference.Reference) -> dict[str, str]:
+    return reference.pages(book)
+
+
+def test_reference_pages_are_up_to_date(pages: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reference, "pages", lambda: pages)
     assert reference.main(["--check"]) == 0, "docstrings have changed: python3 dev.py reference"
 
 
@@ -52,10 +59,10 @@ def test_every_public_name_has_a_docstring(book: reference.Reference) -> None:
     assert silent == []
 
 
-def test_internal_names_are_absent_from_the_reference() -> None:
+def test_internal_names_are_absent_from_the_reference(pages: dict[str, str]) -> None:
     found = [
         f"{name}: {line}"
-        for name, page in reference.pages().items()
+        for name, page in pages.items()
         for line in page.splitlines()
         if INTERNAL.search(line.replace("raw_image", ""))
     ]
@@ -72,8 +79,7 @@ def test_members_listed_as_internal_exist(book: reference.Reference) -> None:
         assert member in inherited, f"{each} is gone: {init}"
 
 
-def test_reference_lines_fit_the_width_and_links_resolve() -> None:
-    pages = reference.pages()
+def test_reference_lines_fit_the_width_and_links_resolve(pages: dict[str, str]) -> None:
     headings = {
         name: {
             re.sub(r"[^\w-]", "", line.lstrip("# ").lower())

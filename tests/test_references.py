@@ -5,11 +5,13 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
-from functools import cache
 from pathlib import Path
 
 import pytest
 
+from tests import syntax
+
+pytestmark = pytest.mark.usefixtures("syntax_trees")
 ROOT = Path(__file__).parents[1]
 HOMES = ("nep", "app", "tests", "tools", "bench", "docs", "examples", "installers")
 FILES = ("README.md", "CONTRIBUTING.md", "dev.py", "hatch_build.py", "pyproject.toml")
@@ -34,7 +36,7 @@ _WORD = re.compile(r"\w+")
 _FILE_NAME = re.compile(r".*\.(?:md|json|csv|dll|nepb)")
 
 
-@cache
+@syntax.cached
 def _texts() -> dict[str, str]:
     found = [ROOT / name for name in FILES]
     for home in HOMES:
@@ -49,27 +51,26 @@ def _texts() -> dict[str, str]:
     }
 
 
-@cache
+@syntax.cached
 def _module(name: str) -> Path | None:
     place = ROOT / name.replace(".", "/")
     options = (place.with_name(place.name + ".py"), place / "__init__.py")
     return next((each for each in options if each.is_file()), None)
 
 
-@cache
+@syntax.cached
 def _names_in(module: Path) -> frozenset[str]:
     """Return the names that a module binds, and the members of its classes."""
-    tree = ast.parse(module.read_text(encoding="utf-8"))
-    names: set[str] = set()
-    for node in ast.walk(tree):
-        if isinstance(node, ast.ClassDef | ast.FunctionDef):
-            names.add(node.name)
-        elif isinstance(node, ast.Name):
-            names.add(node.id)
-        elif isinstance(node, ast.Attribute):
-            names.add(node.attr)
-        elif isinstance(node, ast.Import | ast.ImportFrom):
-            names |= {each.asname or each.name for each in node.names}
+    tree = syntax.parse(module)
+    names = {node.name for kind in (ast.ClassDef, ast.FunctionDef) for node in syntax.nodes(tree, kind)}
+    names |= {node.id for node in syntax.nodes(tree, ast.Name)}
+    names |= {node.attr for node in syntax.nodes(tree, ast.Attribute)}
+    names |= {
+        each.asname or each.name
+        for kind in (ast.Import, ast.ImportFrom)
+        for node in syntax.nodes(tree, kind)
+        for each in node.names
+    }
     return frozenset(names)
 
 
@@ -87,7 +88,7 @@ def _is_there(dotted: str) -> bool:
     return False
 
 
-@cache
+@syntax.cached
 def _words() -> frozenset[str]:
     """Return the words of the sources outside of backticks."""
     texts = [text for place, text in _texts().items() if not place.endswith(".md")]
@@ -148,7 +149,7 @@ def test_every_document_link_resolves() -> None:
     assert {each for each in links if not ((ROOT / each[0]).parent / each[1]).exists()} == set()
 
 
-@cache
+@syntax.cached
 def _anchors(page: Path) -> frozenset[str]:
     """Return the anchors that GitHub generates for the headings of a page."""
     text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
@@ -172,24 +173,19 @@ def test_every_anchor_of_a_link_is_a_heading() -> None:
     } == set()
 
 
-@cache
+@syntax.cached
 def _trees() -> dict[str, ast.Module]:
     """Return the parsed modules of nep, app and tools by path."""
     return {
-        place: ast.parse(text)
-        for place, text in _texts().items()
+        place: syntax.parse(ROOT / place)
+        for place in _texts()
         if place.startswith(("nep/", "app/", "tools/")) and place.endswith(".py")
     }
 
 
-@cache
+@syntax.cached
 def _classes() -> dict[str, ast.ClassDef]:
-    return {
-        node.name: node
-        for tree in _trees().values()
-        for node in ast.walk(tree)
-        if isinstance(node, ast.ClassDef)
-    }
+    return {node.name: node for tree in _trees().values() for node in syntax.nodes(tree, ast.ClassDef)}
 
 
 def _arguments(function: ast.FunctionDef | ast.AsyncFunctionDef) -> set[str]:
@@ -199,7 +195,7 @@ def _arguments(function: ast.FunctionDef | ast.AsyncFunctionDef) -> set[str]:
     return {each.arg for each in found if each is not None}
 
 
-@cache
+@syntax.cached
 def _members(of: ast.ClassDef) -> set[str]:
     """Return the attributes and methods of a class and its bases, and the arguments of its constructor."""
     names: set[str] = set()
@@ -230,10 +226,11 @@ def _described(docstring: str) -> Iterator[str]:
 def test_docstring_sections_describe_existing_names() -> None:
     count, missing = 0, set()
     for place, tree in _trees().items():
-        for node in ast.walk(tree):
-            if isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+        for kind in (ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef):
+            for node in syntax.nodes(tree, kind):
                 names = list(_described(ast.get_docstring(node) or ""))
-                known = _members(node) if isinstance(node, ast.ClassDef) else _arguments(node)
+                known = _members(node) if names and isinstance(node, ast.ClassDef) else set()
+                known |= set() if isinstance(node, ast.ClassDef) else _arguments(node)
                 count += len(names)
                 missing |= {(place, node.name, name) for name in names if name not in known}
     assert count > 5000

@@ -27,6 +27,7 @@ from nep.i18n import _, format_list, install, lazy, ngettext, number, pgettext, 
 from tests.blocks.samples import robot
 from tests.pseudo import marked
 
+pytestmark = pytest.mark.usefixtures("syntax_trees")
 PO = r"""
 msgid ""
 msgstr ""

@@ -4,23 +4,26 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
-from functools import lru_cache
 from pathlib import Path
 from string import Formatter
 
+import pytest
+
+from tests import syntax
+
+pytestmark = pytest.mark.usefixtures("syntax_trees")
 ROOT = Path(__file__).resolve().parents[1]
 CALLS = ("_", "ngettext", "pgettext")
 
 
-@lru_cache(maxsize=1)
+@syntax.cached
 def sources() -> dict[str, ast.Module]:
     """Return the modules with translatable texts by path."""
     found = {}
     for folder in ("nep", "app"):
         for path in sorted((ROOT / folder).rglob("*.py")):
-            text = path.read_text(encoding="utf-8")
-            if "nep.i18n" in text:
-                found[path.relative_to(ROOT).as_posix()] = ast.parse(text)
+            if "nep.i18n" in path.read_text(encoding="utf-8"):
+                found[path.relative_to(ROOT).as_posix()] = syntax.parse(path)
     return found
 
 

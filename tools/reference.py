@@ -526,9 +526,9 @@ def reference() -> Reference:
     return Reference(cast("griffe.Module", package))
 
 
-def pages() -> dict[str, str]:
-    """Return the Markdown text of all pages by file name."""
-    documentation = reference()
+def pages(documentation: Reference | None = None) -> dict[str, str]:
+    """Return the Markdown text of all pages by file name; by default of the current sources."""
+    documentation = documentation or reference()
     return {
         "README.md": documentation.contents(),
         **{f"{each}.md": documentation.page(each) for each in PAGES},
