@@ -16,6 +16,7 @@ from typing import Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from nep.cli.typer_values import skip_needless_imports
 from nep.i18n import _, lazy
 from nep.text import escaped
 
@@ -78,8 +79,9 @@ def _translate_usage_errors() -> Iterator[None]:
         raise _UsageError(message, ctx=error.ctx) from error
 
 
-def _translate_help_texts(parameters: Sequence[Any]) -> Sequence[Any]:
+def _prepare(parameters: Sequence[Any]) -> Sequence[Any]:
     for parameter in parameters:
+        skip_needless_imports(parameter)
         if getattr(parameter, "help", None) in _BUILTIN_HELP_TEXTS:
             parameter.help = _(parameter.help)
     return parameters
@@ -108,7 +110,7 @@ class TranslatedCommand(TyperCommand):
 
     def get_params(self, ctx: Any) -> Any:  # noqa: ANN401
         """Return the parameters of the command; the help of built-in options is translated."""
-        return _translate_help_texts(super().get_params(ctx))
+        return _prepare(super().get_params(ctx))
 
     def format_usage(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
         """Write the translated usage line."""
@@ -120,7 +122,7 @@ class TranslatedGroup(TyperGroup):
 
     def get_params(self, ctx: Any) -> Any:  # noqa: ANN401
         """Return the parameters of the group; the help of built-in options is translated."""
-        return _translate_help_texts(super().get_params(ctx))
+        return _prepare(super().get_params(ctx))
 
     def format_usage(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
         """Write the translated usage line."""
