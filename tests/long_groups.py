@@ -198,6 +198,18 @@ GROUPS = (
         sources=("app/ui/panels/base.py", "app/ui/panels/registry.py", "app/ui/shell/"),
     ),
     Group(
+        "installed wheel",  # every run includes the other tests of the wheel
+        tests=("tests/test_distribution.py::installed_wheel",),
+        sources=(
+            "hatch_build.py",
+            "nep/__init__.py",
+            "nep/public.py",
+            "pyproject.toml",
+            "requirements/",
+            "tools/library_alone.py",
+        ),
+    ),
+    Group(
         "installers",
         tests=("tests/installers/",),
         sources=("dev.py", "installers/", "nep/locale/", "nep/version.py", "pyproject.toml", "requirements/"),

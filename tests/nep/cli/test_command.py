@@ -112,10 +112,11 @@ def running_master(address):
         yield master
 
 
-def test_help_lists_commands_and_subcommands():
-    shown = run("--help").stdout
+def test_help_lists_commands_and_subcommands(type_in):
+    shown = type_in("--help").stdout
     assert all(word in shown for word in ("master", "node", "topic"))
-    assert all(word in run("topic", "--help").stdout for word in ("list", "echo", "pub"))
+    shown = type_in("topic", "--help").stdout
+    assert all(word in shown for word in ("list", "echo", "pub"))
 
 
 def test_version_option_prints_the_package_version():
@@ -218,7 +219,8 @@ def test_empty_lists_show_a_message_and_empty_json(running_master, type_in):
     assert json.loads(type_in("topic", "list", "--json").stdout) == []
 
 
-def test_topic_pub_delivers_the_message(running_master):
+@pytest.mark.usefixtures("patient")
+def test_topic_pub_delivers_the_message(running_master, type_in):
     with nep.node("listener") as node, node.new_sub("t") as sub:
         done = run("topic", "pub", "t", '{"message": "Grüße"}')
         assert done.returncode == 0
@@ -226,7 +228,7 @@ def test_topic_pub_delivers_the_message(running_master):
         assert sub.listen(timeout_s=LONG_S) == (True, {"message": "Grüße"})
         run("topic", "pub", "t", "-", given='{"n": 1}\n{"n": 2}\n')
         assert [sub.listen(timeout_s=LONG_S)[1]["n"] for _ in range(2)] == [1, 2]
-        run("topic", "pub", "t", "7", "--rate", "200", "--count", "5")
+        type_in("topic", "pub", "t", "7", "--rate", "200", "--count", "5")
         assert [sub.listen(timeout_s=LONG_S)[1] for _ in range(5)] == [7] * 5
 
 
@@ -246,12 +248,13 @@ def test_invalid_payload_or_topic_exits_with_code_1_and_invalid_rate_with_code_2
     assert type_in("topic", "pub", "t", "1", "--rate", "0").returncode == 2
 
 
-def test_echo_writes_one_json_object_per_line(running_master):
+@pytest.mark.usefixtures("patient")
+def test_echo_writes_one_json_object_per_line(running_master, type_in):
     with nep.node("talker") as node:
         node.new_pub("t", latched=True).publish({"n": 1})
         record = json.loads(run("topic", "echo", "t", "--count", "1", "--json").stdout)
         assert (record["topic"], record["seq"], record["payload"]) == ("t", 1, {"n": 1})
-        assert '{"n":1}' in run("topic", "echo", "t", "-n", "1").stdout
+        assert '{"n":1}' in type_in("topic", "echo", "t", "-n", "1").stdout
 
 
 def test_echo_exits_when_its_timeout_expires(running_master, type_in):
@@ -296,12 +299,12 @@ def test_closed_output_pipe_ends_echo_with_exit_code_1_without_traceback(running
         assert "Traceback" not in echo.process.stderr.read()
 
 
-def test_master_runs_until_ctrl_c_and_a_second_one_fails(address, start):
+def test_master_runs_until_ctrl_c_and_a_second_one_fails(address, start, type_in):
     port = address.rpartition(":")[2]
     first = start("master", "--port", port, "--no-gateway")
     assert address in first.wait_says("master at")
     assert nep.is_running(address, LONG_S)
-    second = run("master", "--no-gateway")
+    second = type_in("master", "--no-gateway")
     assert second.returncode == 1
     assert "already running" in second.stderr
     code, _, err = first.interrupt()
@@ -329,7 +332,7 @@ def test_master_at_a_network_address_without_the_listen_option_is_rejected_with_
 
 
 @pytest.mark.skipif(sys.platform == "darwin", reason="macOS answers at one loopback address only")
-def test_master_with_listen_option_prints_its_address_for_other_computers_and_warns(address, start):
+def test_master_with_listen_option_prints_its_address_for_other_computers_and_warns(address, start, type_in):
     port = address.rpartition(":")[2]
     master = start("master", "--port", port, "--no-gateway", "--listen", "127.0.0.2")
     assert address in master.wait_says("master at")
@@ -337,7 +340,7 @@ def test_master_with_listen_option_prints_its_address_for_other_computers_and_wa
     assert f"NEP_MASTER=127.0.0.2:{port}" in master.wait_says("other computers connect with")
     assert master.wait_says("no password")
     master.interrupt()
-    refused = run("master", "--port", port, "--no-gateway", "--listen", "203.0.113.77")
+    refused = type_in("master", "--port", port, "--no-gateway", "--listen", "203.0.113.77")
     assert refused.returncode == 1
     assert "'203.0.113.77' isn't an address of this computer" in refused.stderr
 

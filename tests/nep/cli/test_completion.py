@@ -47,6 +47,26 @@ def complete(shell: str, line: str) -> list[str]:
 
 
 @pytest.fixture
+def completed(type_in, monkeypatch):
+    """Function that returns bash's completions of a line without a new process."""
+    for name in ("_CONNECT_TIMEOUT_S", "_REPLY_TIMEOUT_S", "_MESSAGE_TIMEOUT_S"):
+        monkeypatch.setattr(f"nep.cli.complete.{name}", 30.0)
+
+    def completions(line):
+        monkeypatch.setattr(
+            sys.modules["__main__"], "__package__", None
+        )  # or the program is "python -m pytest"
+        monkeypatch.setenv("_NEP_COMPLETE", "complete_bash")
+        monkeypatch.setenv("COMP_WORDS", line)
+        monkeypatch.setenv("COMP_CWORD", str(len(line.split(" ")) - 1))
+        done = type_in()
+        assert done.stderr == ""
+        return done.stdout.split()
+
+    return completions
+
+
+@pytest.fixture
 def robot(master):
     with nep.node("Pepper") as node:
         pubs = [node.new_pub("/odom", latched=True), node.new_pub("/odd"), node.new_pub("words", "string")]
@@ -64,37 +84,37 @@ def test_topics_are_completed_in_zsh(robot):
     assert complete("zsh", "nep topic hz /o") == ["/odd", "/odom"]
 
 
-def test_topic_already_on_the_command_line_is_not_completed_again(robot):
-    assert complete("bash", "nep topic hz /odom /o") == ["/odd"]
+def test_topic_already_on_the_command_line_is_not_completed_again(robot, completed):
+    assert completed("nep topic hz /odom /o") == ["/odd"]
 
 
-def test_fields_of_the_topic_are_completed(robot):
-    assert complete("bash", "nep topic echo /odom po") == ["pose.x", "pose.y"]
-    assert complete("bash", "nep topic echo /odom j") == ["joints[0]", "joints[1]"]
+def test_fields_of_the_topic_are_completed(robot, completed):
+    assert completed("nep topic echo /odom po") == ["pose.x", "pose.y"]
+    assert completed("nep topic echo /odom j") == ["joints[0]", "joints[1]"]
 
 
-def test_topics_and_types_are_completed_for_info_and_find(robot):
-    assert complete("bash", "nep topic info /odo") == ["/odom"]
-    assert complete("bash", "nep topic find s") == ["string"]
+def test_topics_and_types_are_completed_for_info_and_find(robot, completed):
+    assert completed("nep topic info /odo") == ["/odom"]
+    assert completed("nep topic find s") == ["string"]
 
 
-def test_node_names_and_log_levels_are_completed(robot):
-    assert complete("bash", "nep log --node P") == ["Pepper"]
-    assert complete("bash", "nep log --level w") == ["warning"]
+def test_node_names_and_log_levels_are_completed(robot, completed):
+    assert completed("nep log --node P") == ["Pepper"]
+    assert completed("nep log --level w") == ["warning"]
 
 
-def test_completion_without_a_reachable_master_is_empty(monkeypatch):
+def test_completion_without_a_reachable_master_is_empty(monkeypatch, completed):
     monkeypatch.setenv("NEP_MASTER", "127.0.0.1:1")
-    assert complete("bash", "nep topic echo /o") == []
+    assert completed("nep topic echo /o") == []
     line = SimpleNamespace(params={}, find_root=lambda: SimpleNamespace(params={}))
     with pytest.raises(OSError, match=r"refused|timed out"):  # fails at once, without waiting for a master
         _reachable_master(line)
     for wrong in ("no address at all", "a..b:7780", f"{'x' * 70}.invalid"):
         monkeypatch.setenv("NEP_MASTER", wrong)
-        assert complete("bash", "nep topic echo /o") == []
+        assert completed("nep topic echo /o") == []
 
 
-def test_second_topic_is_completed_and_queries_leave_no_alert(robot, master):
-    assert complete("bash", "nep topic echo /odom /o") == ["/odd"]
-    assert complete("bash", "nep topic echo /odom po") == ["pose.x", "pose.y"]
+def test_second_topic_is_completed_and_queries_leave_no_alert(robot, master, completed):
+    assert completed("nep topic echo /odom /o") == ["/odd"]
+    assert completed("nep topic echo /odom po") == ["pose.x", "pose.y"]
     assert not master.view().alerts

@@ -19,7 +19,6 @@ from nep.system.streams import command_line_arguments
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 LONG_S = 140
-CODE_PAGES = ("cp1252", "cp437", "ascii", "latin-1")
 NASTY = "😀 \u2013 “two” → \x1b[2J \x9b2J \u202e Grüße 日本"
 TOPIC = "/Größe\u2013“😀”"
 
@@ -71,7 +70,10 @@ COMMANDS = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("page", CODE_PAGES)
+@pytest.mark.parametrize(
+    "page",
+    ["ascii", "cp1252", *(pytest.param(page, marks=pytest.mark.long) for page in ("cp437", "latin-1"))],
+)
 def test_commands_print_their_output_in_limited_code_pages(talkers, page):
     given = "\n".join("\t".join(words) for words in COMMANDS)
     done = subprocess.run(
@@ -117,10 +119,15 @@ FULL = Path("/dev/full")
 
 @pytest.mark.skipif(not FULL.exists(), reason="/dev/full is a device of Linux")
 @pytest.mark.parametrize(
-    "words",
-    [("--help",), ("topic", "list"), ("topic", "list", "--json"), ("topic", "echo", TOPIC, "--csv", "said")],
+    ("words", "unbuffered"),
+    [
+        (("--help",), ""),
+        (("topic", "list"), "1"),
+        (("topic", "list", "--json"), ""),
+        (("topic", "echo", TOPIC, "--csv", "said"), ""),
+        (("topic", "echo", TOPIC, "--csv", "said"), "1"),
+    ],
 )
-@pytest.mark.parametrize("unbuffered", ["", "1"])
 def test_full_disk_is_reported(talkers, words, unbuffered):
     env = {"PYTHONUNBUFFERED": unbuffered}  # set in many containers
     with FULL.open("w") as full, command(*words, stdout=full, env=env) as running:

@@ -158,7 +158,7 @@ KINDS = st.sampled_from(["join", "leave", "renew", "remove", "alert", "retype"])
 CHANGES = st.lists(st.tuples(KINDS, st.integers(0, 4)))
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=30)
 @given(CHANGES)
 def test_incremental_view_matches_a_full_view(changes: list[tuple[str, int]]) -> None:
     graph = graph_of(3)

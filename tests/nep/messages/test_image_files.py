@@ -157,7 +157,7 @@ FILE_PNG = cv2.imencode(".png", scene())[1].tobytes()
     st.lists(st.tuples(st.integers(0, 700), st.integers(0, 255)), max_size=4),
     st.integers(0, 2000),
 )
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 def test_decoded_image_has_the_size_in_its_header_despite_corruption(
     data: bytes, changes: list[tuple[int, int]], end: int
 ) -> None:

@@ -90,7 +90,7 @@ def levels_of(value: object) -> int:
     return 1 + max(map(levels_of, value.values()), default=0) if isinstance(value, dict) else 0
 
 
-@settings(max_examples=150)
+@settings(max_examples=60)
 @given(JSON_VALUES, st.integers(0, 80))
 def test_depth_check_of_json_bytes_matches_depth_of_the_value(value: object, around: int) -> None:
     for _level in range(around):
@@ -115,7 +115,7 @@ PACKED_VALUES = st.recursive(
 )
 
 
-@settings(max_examples=150)
+@settings(max_examples=60)
 @given(PACKED_VALUES, st.integers(50, 70), st.sampled_from(["list", "tuple", "map"]))
 def test_depth_check_of_decoded_msgpack_matches_depth_of_the_value(
     value: object, around: int, kind: str

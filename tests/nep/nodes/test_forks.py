@@ -154,7 +154,8 @@ print(sub.listen(timeout_s=30.0)[1], sub.lost)
         assert program.end()[1] == ""
 
 
-def test_fork_while_threads_use_the_node_does_not_deadlock(master: Master) -> None:
+@pytest.mark.parametrize("forks", [10, pytest.param(30, marks=pytest.mark.long)])
+def test_fork_while_threads_use_the_node_does_not_deadlock(master: Master, forks: int) -> None:
     """Fork while threads publish, listen, spin, log and open nodes, so that any lock may be held."""
     code = (
         CHILD
@@ -191,15 +192,15 @@ def use():
     with nep.node("child") as mine:
         mine.new_pub("own").publish("x" * 100_000)
 
-print([child(use) for _ in range(30)])
+print([child(use) for _ in range(int(sys.argv[1]))])
 stop.set()
 for thread in threads:
     thread.join()
 print(nodes_left(node))
 """
     )
-    with running(code) as program:
-        assert program.line() == str([0] * 30)
+    with running(code, str(forks)) as program:
+        assert program.line() == str([0] * forks)
         assert program.line() == "1"
         assert program.end()[1] == ""
 
