@@ -24,6 +24,8 @@ REPOSITORY = Path(__file__).resolve().parents[3]
 LONG_S = 120
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(REPOSITORY), "PYTHONIOENCODING": "utf-8", "COLUMNS": "300"}
 UP = "ip link set lo up"
+START_MASTER = "pipe=$(mktemp -u); mkfifo $pipe; NEP master 2>$pipe & master=$!; exec 3<$pipe; rm $pipe"
+"""Shell commands that start a master whose error stream is file descriptor 3."""
 
 
 def alone(script: str, *, up: bool) -> subprocess.CompletedProcess[str]:
@@ -36,7 +38,8 @@ def alone(script: str, *, up: bool) -> subprocess.CompletedProcess[str]:
         pytest.skip("a network of one's own needs Linux with unshare and ip")
     if subprocess.run([unshare, "-rn", "true"], check=False, capture_output=True).returncode:
         pytest.skip("this computer does not permit networks of one's own (unshare -rn)")
-    lines = [UP if up else "true", "cd /", textwrap.dedent(script).replace("NEP", f"{sys.executable} -m nep")]
+    commands = textwrap.dedent(script).replace("START_MASTER", START_MASTER)
+    lines = [UP if up else "true", "cd /", commands.replace("NEP", f"{sys.executable} -m nep")]
     return subprocess.run(
         [unshare, "-rn", "sh", "-c", "\n".join(lines)],
         env={**ENVIRONMENT, "NEP_MASTER": "127.0.0.1:7780", "NEP_GATEWAY": "0"},
@@ -50,13 +53,13 @@ def alone(script: str, *, up: bool) -> subprocess.CompletedProcess[str]:
 def test_commands_work_with_only_the_loopback_interface():
     done = alone(
         """
-        NEP master 2>master.log & master=$!
-        until NEP node list >/dev/null 2>&1; do :; done
+        START_MASTER
+        read said <&3
         NEP topic pub words '"hello"' --latched >/dev/null 2>&1 & pub=$!
         NEP topic echo words -n 1
         NEP doctor; echo "doctor $?"
         kill $pub $master
-        """.replace("master.log", os.devnull),
+        """,
         up=True,
     )
     assert "#1  hello" in done.stdout
@@ -69,11 +72,13 @@ def test_disabled_loopback_is_reported_by_the_doctor_and_commands_print_no_trace
         """
         NEP doctor --json
         NEP node list; echo "list $?" >&2
-        said=$(mktemp)
-        NEP master 2>$said & master=$!
-        until grep -q "can't reach the master" $said; do kill -0 $master || break; done
+        START_MASTER
+        while read said <&3; do
+            echo "$said" >&2
+            case $said in *"can't reach the master"*) break ;; esac
+        done
         kill $master
-        cat $said >&2; rm $said
+        cat <&3 >&2
         """,
         up=False,
     )
@@ -137,17 +142,20 @@ def test_master_names_the_foreign_program_that_holds_its_port():
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows keeps permissions in another way")
-def test_doctor_reports_an_unwritable_state_folder(tmp_path):
+def test_doctor_reports_an_unwritable_state_folder(tmp_path, type_in, monkeypatch):
     (tmp_path / "file").touch()
-    done = run("doctor", "--json", NEP_STATE_DIR=str(tmp_path / "file" / "state"), NEP_MASTER="127.0.0.1:1")
+    monkeypatch.setenv("NEP_STATE_DIR", str(tmp_path / "file" / "state"))
+    monkeypatch.setenv("NEP_MASTER", "127.0.0.1:1")
+    done = type_in("doctor", "--json")
     (found,) = [each for each in json.loads(done.stdout) if each["id"].startswith("folder:")]
     assert found["severity"] == "error"
     assert "not a directory" in found["sentence"]
     assert done.returncode == 2
 
 
-def test_invalid_master_address_is_reported():
-    done = run("node", "list", NEP_MASTER="no address at all")
+def test_invalid_master_address_is_reported(type_in, monkeypatch):
+    monkeypatch.setenv("NEP_MASTER", "no address at all")
+    done = type_in("node", "list")
     assert done.returncode == 1
     assert done.stderr.startswith("nep: 'no address at all:7780' isn't a valid address of a master")
 

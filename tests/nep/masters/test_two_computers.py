@@ -110,7 +110,7 @@ def advertised(computers: Computers) -> str:
 
 
 @pytest.mark.timeout(240)
-@pytest.mark.parametrize("backend", ["zeromq", "nanomsg"])
+@pytest.mark.parametrize("backend", ["zeromq", pytest.param("nanomsg", marks=pytest.mark.long)])
 def test_two_computers_communicate_after_an_address_change_and_a_cable_reconnection(
     computers: Computers, backend: str
 ) -> None:
