@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import json
+import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -21,6 +22,8 @@ from app.blocks.toolbox.definitions import editor_definitions
 from app.blocks.toolbox.help import help_of
 from app.robots.description.description import parse, thing_description
 from app.robots.kit import Driver
+from nep.backends.base import find_backend
+from nep.errors import UnknownBackendError
 from nep.masters.master import Master
 from nep.system.plugins import discover
 from tests.blocks import samples
@@ -71,6 +74,24 @@ def test_back_end_plug_in_is_discovered(write: Write) -> None:
         subscriber = two.new_sub("topic")
         one.new_pub("topic").publish({"hello": 1})
         assert subscriber.listen(timeout_s=30.0) == (True, {"hello": 1})
+
+
+@pytest.mark.parametrize("name", ["zeromq", "ZMQ"])
+def test_node_finds_its_back_end_by_name_or_alias_and_imports_no_other_for_its_name(name: str) -> None:
+    code = (
+        "import sys\n"
+        "from nep.backends.base import find_backend\n"
+        "assert find_backend(sys.argv[1]).name == 'zeromq'\n"
+        "print('nep.backends.zenoh' in sys.modules)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code, name], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == str(name == "ZMQ")
+
+
+@pytest.mark.parametrize("name", ["base", "no_such", "zeromq.transport", "", "no name"])
+def test_module_without_a_back_end_is_not_found(name: str) -> None:
+    with pytest.raises(UnknownBackendError):
+        find_backend(name)
 
 
 def test_category_plug_in_is_in_the_toolbox_and_its_block_compiles(write: Write) -> None:

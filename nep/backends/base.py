@@ -24,7 +24,7 @@ from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import NodeRecord
 from nep.system.addresses import master_address
 from nep.system.descriptors import check_free_descriptors
-from nep.system.plugins import discover, discover_own
+from nep.system.plugins import discover, discover_own, find_own
 
 HANDSHAKE_TIMEOUT_S = 0.5
 """Maximum time in seconds that a new publisher or subscriber waits for the handshake with its peers."""
@@ -304,6 +304,9 @@ def find_backend(name: str) -> Backend:
         UnknownBackendError: No back end has this name.
         TooManyFilesError: The process is out of file descriptors.
     """
+    found = find_own("nep.backends", name.lower(), "BACKEND", Backend)
+    if found is not None:  # without importing the other back ends, which takes longer than the rest of nep
+        return found
     try:
         own_backends = discover_own("nep.backends", "BACKEND", Backend)
     except PluginsMissingError:

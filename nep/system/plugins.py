@@ -7,6 +7,7 @@ plug-in. Other distributions can add plug-ins as entry points (`discover`).
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import logging
 import pkgutil
 from collections.abc import Mapping
@@ -61,6 +62,18 @@ def discover_own(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]
     if not plugins:
         raise PluginsMissingError(package, attribute)
     return plugins
+
+
+def find_own(package: str, name: str, attribute: str, kind: type[T]) -> T | None:
+    """Return the plug-in of a package with this name if its module has the name, too; None otherwise.
+
+    Imports no other plug-in.
+    """
+    module = f"{package}.{name}"
+    if not name.isidentifier() or importlib.util.find_spec(module) is None:
+        return None
+    plugin = getattr(importlib.import_module(module), attribute, None)
+    return plugin if isinstance(plugin, kind) and plugin.name == name else None
 
 
 def discover(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]:
