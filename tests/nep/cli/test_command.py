@@ -299,12 +299,12 @@ def test_closed_output_pipe_ends_echo_with_exit_code_1_without_traceback(running
         assert "Traceback" not in echo.process.stderr.read()
 
 
-def test_master_runs_until_ctrl_c_and_a_second_one_fails(address, start, type_in):
+def test_master_runs_until_ctrl_c_and_a_second_one_fails(address, start):
     port = address.rpartition(":")[2]
     first = start("master", "--port", port, "--no-gateway")
     assert address in first.wait_says("master at")
     assert nep.is_running(address, LONG_S)
-    second = type_in("master", "--no-gateway")
+    second = run("master", "--no-gateway")
     assert second.returncode == 1
     assert "already running" in second.stderr
     code, _, err = first.interrupt()
