@@ -120,6 +120,36 @@ GROUPS = (
         ),
     ),
     Group(
+        "ROS 1",  # every run includes a bridge, a topic and the services of a ROS client: see quick
+        tests=(
+            "tests/core/networks/test_looking.py::ros_1",
+            "tests/nep/backends/test_ros.py",
+            "tests/nep/backends/test_ros_faults.py",
+            "tests/nep/backends/test_ros_services.py",
+            "tests/nep/bridges/test_ros_bridge.py",
+        ),
+        sources=(
+            "app/core/networks/",
+            "nep/backends/base.py",
+            "nep/backends/bases/",
+            "nep/backends/connection.py",
+            "nep/backends/ros/",
+            "nep/backends/ros_types/",
+            "nep/backends/services.py",
+            "nep/programs/bridges/",
+            "nep/protocol/service_wire.py",
+            "tests/core/networks/watching_child.py",
+            "tests/nep/backends/ros_",
+            "tests/nep/backends/test_contract",
+            "tests/nep/bridges/joined.py",
+            "tests/nep/services/test_calls.py",
+        ),
+        quick=(
+            "tests/nep/backends/test_ros.py::test_nep_receives_messages_from_a_ros_program",
+            "tests/nep/backends/test_ros_services.py::test_ros_client_calls_a_nep_server",
+        ),
+    ),
+    Group(
         "ROS 2",  # every run includes the contract over Cyclone DDS: test_ros2.py[test_contract.py-]
         tests=("tests/nep/backends/test_ros2.py::[ros2_", "tests/nep/bridges/test_ros2_bridge.py"),
         sources=(

@@ -81,6 +81,7 @@ def test_changes_are_unknown_in_a_shallow_clone_and_outside_a_repository(
         ("installers/linux/packer.py", {"installers"}),
         ("dev.py", {"installers"}),
         ("nep/backends/ros2/names.py", {"ROS 2"}),
+        ("nep/backends/ros/transport.py", {"ROS 1"}),
         ("nep/programs/gateway/relay.py", {"interop"}),
         ("tests/nep/backends/test_ros2.py", {"ROS 2"}),
         ("bench/soak.py", {"soak"}),
@@ -98,7 +99,7 @@ def test_changed_file_runs_the_groups_that_depend_on_the_file(path: str, run: se
 
 def test_groups_named_on_the_command_line_run() -> None:
     assert skipped_groups([]) == NAMES
-    assert skipped_groups([], ["tests/installers/test_linux.py::test_x", "tests/core/"]) == ()
+    assert skipped_groups([], ["tests/installers/test_linux.py::test_x", "tests/robots/"]) == ()
     assert skipped_groups([], ["tests/e2e/"]) == E2E_NAMES
     assert relative_arguments(["ui", "../dev.py::x"], ROOT / "tests") == ("tests/ui/", "dev.py::x")
 

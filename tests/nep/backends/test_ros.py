@@ -12,7 +12,6 @@ import psutil
 import pytest
 
 import nep
-from nep.backends.ros.library import RosFinder, load_rospy
 from tests.nep.backends.ros_programs import FIND_ROS, free_port, ros_master, skip_without_ros, told
 from tests.nep.programs import ROOT, running
 
@@ -303,38 +302,6 @@ def test_unsupported_options_and_types_are_rejected(ros: str) -> None:
             node.new_pub("topic", "nav_nothing/Odometry")
         with pytest.raises(nep.NepError, match="sudo apt install python3-geometry-msgs"):
             node.new_pub("topic", "geometry_msgs/Twisst")
-
-
-def test_missing_rospy_is_reported_with_the_install_command() -> None:
-    def missing(_name: str) -> object:
-        raise ImportError
-
-    with pytest.raises(
-        nep.NepError, match="'ros' isn't installed; install it with 'sudo apt install python3-rospy"
-    ):
-        load_rospy(missing)  # type: ignore[arg-type]
-
-
-def test_rospy_is_not_imported_unless_requested() -> None:
-    code = (
-        "import sys, nep; nep.node('a').close(); names = 'rospy', 'xmlrpc', 'nep.backends.ros.transport'; "
-        "sys.exit(any(each in sys.modules for each in names))"
-    )
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
-
-
-def test_finder_imports_only_ros_packages_from_outside_the_environment(tmp_path: Path) -> None:
-    for name in ("rospy", "numpy_of_debian", "my_msgs", "turtle"):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "__init__.py").touch()
-    finder = RosFinder([str(tmp_path)])
-    found = [
-        name for name in ("rospy", "numpy_of_debian", "my_msgs", "turtle") if finder.find_spec(name, None)
-    ]
-    assert found == ["rospy", "my_msgs"]
-    finder.extra_names.add("turtle")
-    assert finder.find_spec("turtle", None) is not None
-    assert finder.find_spec("rospy", [str(tmp_path)]) is None
 
 
 MUCH = """

@@ -9,9 +9,6 @@ from pathlib import Path
 import pytest
 
 import nep
-from nep.backends.ros.address import ros_master_address
-from nep.backends.ros.queue_room import QueueLimit
-from nep.backends.ros.type_mapping import unpacker_for
 from tests.nep.backends.ros_programs import FIND_ROS, free_port, ros_master, skip_without_ros, told
 from tests.nep.programs import running
 
@@ -267,88 +264,3 @@ def test_invalid_ros_ip_is_reported_and_an_empty_one_is_ignored(ros: str, own: s
     with running(OWN_ADDRESS, **{**told(ros), "ROS_IP": own}) as program:
         assert program.line() == program.line() == said
         assert program.end() == ("", "")
-
-
-@pytest.mark.parametrize(
-    ("given", "address"),
-    [
-        ("http://robot:11312/", "robot:11312"), ("192.168.1.5", "192.168.1.5:11311"), ("h:1", "h:1"),
-        ("https://h", "h:11311"), ("http://127.0.0.1:11311", "127.0.0.1:11311"),
-    ],
-)  # fmt: skip
-def test_master_address_is_parsed_from_argument_and_environment(
-    given: str, address: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert ros_master_address(given) == address
-    monkeypatch.setenv("ROS_MASTER_URI", given)
-    assert ros_master_address(None) == address
-
-
-@pytest.mark.parametrize(
-    "given", ["http://", "http://h:99999", "h:x", "http://[::1", ":11311", "http://h:0/", " ", "a b"]
-)
-def test_invalid_master_address_is_rejected(given: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("ROS_MASTER_URI", given)
-    with pytest.raises(nep.NepError, match=r"address"):
-        nep.node("n", "ros")
-
-
-def test_default_master_address_is_localhost(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("ROS_MASTER_URI", raising=False)
-    assert ros_master_address(None) == "127.0.0.1:11311"
-    monkeypatch.setenv("ROS_MASTER_URI", "")
-    assert ros_master_address("") == "127.0.0.1:11311"
-
-
-class Connection:
-    """Fake of rospy's QueuedConnection that never sends from its queue."""
-
-    def __init__(self, queue_size: int, queue: list[bytes]) -> None:
-        import threading
-
-        self._lock = threading.Lock()
-        self._queue_size = queue_size
-        self._queue = queue
-
-
-def test_queues_are_trimmed_by_count_and_bytes_per_connection() -> None:
-    few, many = Connection(3, [b"a", b"b", b"c"]), Connection(100, [bytes(10)] * 5)
-    assert QueueLimit().make_room([few, many], 1) == 1
-    assert (few._queue, len(many._queue)) == ([b"b", b"c"], 5)
-    assert QueueLimit(40).make_room([many], 39) == 0, "measured after 40 bytes only"
-    room = QueueLimit(40)
-    assert room.make_room([many], 40) == 5
-    many._queue = [bytes(10)] * 5
-    assert [room.make_room([many], 10) for _ in range(4)] == [0, 0, 0, 2]
-    assert room.make_room([], 50) == 0
-    assert room.make_room([object()], 50) == 0
-    assert room.make_room([Connection(100, [])], 2**40) == 0
-
-
-def test_definition_with_another_checksum_is_rejected() -> None:
-    assert unpacker_for("json", "std_msgs/String", "", "992ce8a1687cec8c8bd883ec73ca41d1").msg_type == "json"
-    with pytest.raises(
-        nep.NepError, match="the publisher's 'sensor_msgs/Image' has different fields from the definition"
-    ):
-        unpacker_for("image", "sensor_msgs/Image", "uint8 data", "0" * 32)
-
-
-def test_compressed_depth_of_ros_is_decoded() -> None:
-    np, cv2 = pytest.importorskip("numpy"), pytest.importorskip("cv2")
-    depth = np.arange(12, dtype=np.uint16).reshape(3, 4) * 5000
-    png = cv2.imencode(".png", depth)[1].tobytes()
-    kind = b"16UC1; compressedDepth png"
-    body = (
-        bytes(16)
-        + len(kind).to_bytes(4, "little")
-        + kind
-        + (len(png) + 12).to_bytes(4, "little")
-        + bytes(12)
-        + png
-    )
-    found = unpacker_for("image", "sensor_msgs/CompressedImage", "")
-    data, extension = found.unpack(memoryview(body))
-    assert (found.codec.decode(data, extension or {}) == depth).all()  # type: ignore[attr-defined]
-    data, extension = found.unpack(memoryview(body.replace(b"16UC1", b"32FC1")))
-    with pytest.raises(nep.DecodeError):
-        found.codec.decode(data, extension or {})

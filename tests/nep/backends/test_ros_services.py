@@ -5,10 +5,8 @@ The contract tests run in a separate process.
 
 from __future__ import annotations
 
-import math
 import os
 import signal
-import struct
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -16,12 +14,6 @@ from pathlib import Path
 
 import pytest
 
-import nep
-from nep.backends.ros.service_types import NEP_CALL, ServiceType
-from nep.backends.ros_types.definition import parse
-from nep.errors import WireError
-from nep.messages.codecs import CODECS
-from nep.protocol.service_wire import CallKind, Reply, error_reply
 from tests.nep.backends.ros_programs import FIND_ROS, free_port, ros_master, skip_without_ros, told
 from tests.nep.programs import ROOT, running
 
@@ -213,47 +205,6 @@ def test_killed_server_is_reported_and_its_successor_is_found(ros: str) -> None:
             client.say("")
             assert client.line() == "answer"
             client.end()
-
-
-def test_nep_call_type_round_trips_calls_and_replies_and_rejects_invalid_ones() -> None:
-    json, msgpack = CODECS["json"], CODECS["msgpack"]
-    body = NEP_CALL.encode_call(json, b'{"a":1}', 1.5)
-    assert body == struct.pack("<HII", 1, 1500, 7) + b'{"a":1}'
-    assert NEP_CALL.decode_call(body) == (b'{"a":1}', 1, 1.5)
-    assert NEP_CALL.decode_call(NEP_CALL.encode_call(msgpack, b"\xc0", None)) == (b"\xc0", 4, None)
-    assert NEP_CALL.decode_call(NEP_CALL.encode_call(json, b"", 1e-9)).timeout_s == 0.001
-    assert NEP_CALL.decode_call(NEP_CALL.encode_call(json, b"", 1e300)).timeout_s == (2**32 - 1) / 1000
-    for reply in (Reply(CallKind.REPLY, b"1"), error_reply(CallKind.ERROR, "ValueError", "no")):
-        assert NEP_CALL.decode_reply(NEP_CALL.encode_reply(reply), json) == reply
-    for wrong in (b"", b"\1\1\0\0\0\0\0", b"\2\1\0\0\0\0", b"\2\1\0\5\0\0\0ab", b"\2\1\0\0\0\0\0x"):
-        with pytest.raises(nep.DecodeError):
-            NEP_CALL.decode_reply(wrong, json)
-    with pytest.raises(nep.DecodeError):
-        NEP_CALL.decode_call(b"\1")
-
-
-def test_ros_service_type_carries_bytes_and_nan_with_msgpack() -> None:
-    kind = ServiceType(
-        "a/B", parse("a/BRequest", "uint8[] data\nfloat64 x"), parse("a/BResponse", "uint8[] data")
-    )
-    json, msgpack = CODECS["json"], CODECS["msgpack"]
-    asked = msgpack.encode({"data": b"\0\xff", "x": math.nan}).data
-    data, codec, timeout_s = kind.decode_call(kind.encode_call(msgpack, asked, 5.0))
-    assert (codec, timeout_s) == (4, None)
-    found = msgpack.decode(data, {})
-    assert found["data"] == b"\0\xff"  # type: ignore[index]
-    assert math.isnan(found["x"])  # type: ignore[index]
-    body = kind.encode_reply(Reply(CallKind.REPLY, b'{"data":[1,2]}', 1))
-    assert kind.decode_reply(body, msgpack).data == msgpack.encode({"data": b"\1\2"}).data
-    with pytest.raises(nep.EncodeError):
-        kind.decode_reply(body, json)
-    for wrong in (
-        Reply(CallKind.ERROR, b"{}"),
-        Reply(CallKind.REPLY, b"{}", 99),
-        Reply(CallKind.REPLY, b"{oops"),
-    ):
-        with pytest.raises((nep.DecodeError, WireError)):
-            kind.encode_reply(wrong)
 
 
 SHUT_DOWN = """
