@@ -16,6 +16,7 @@ import nep
 from nep.cli.screen import UNKNOWN
 from nep.masters.master import Master
 from tests.nep.bridges.joined import taken
+from tests.nep.cli.conftest import type_in as type_in
 from tests.nep.programs import ROOT, eventually, running
 
 COMMAND = "from nep.cli import main; main()"
@@ -263,36 +264,32 @@ def test_terminal_table_updates_in_place_with_warnings_above(file, nodes):
         (("missing.toml", "--rate", "3"), "--direction and --rate can't be used with a file"),
     ],
 )  # fmt: skip
-def test_invalid_bridge_arguments_are_reported_in_one_sentence(words, said):
-    with running(COMMAND, "bridge", *words) as program:
-        out, err = program.end()
-        assert (program.process.returncode, out) == (1, "")
-        assert err.startswith("nep: ")
-        assert said in err
-        assert err.count("\n") == 1
+def test_invalid_bridge_arguments_are_reported_in_one_sentence(type_in, words, said):
+    code, out, err = type_in("bridge", *words)
+    assert (code, out) == (1, "")
+    assert err.startswith("nep: ")
+    assert said in err
+    assert err.count("\n") == 1
 
 
 @pytest.mark.parametrize("rate", ["0", "-1", "nan", "inf", "1e300"])
-def test_invalid_rate_is_rejected(rate):
-    with running(COMMAND, "bridge", "zeromq:/t", "zenoh:/t", "--rate", rate) as program:
-        _out, err = program.end()
-        assert program.process.returncode == 2
-        assert "use messages per second" in re.sub(r"[\s│]+", " ", err)
+def test_invalid_rate_is_rejected(type_in, rate):
+    code, _out, err = type_in("bridge", "zeromq:/t", "zenoh:/t", "--rate", rate)
+    assert code == 2
+    assert "use messages per second" in re.sub(r"[\s│]+", " ", err)
 
 
-def test_check_option_validates_a_file_without_connecting(file):
+def test_check_option_validates_a_file_without_connecting(type_in, file):
     path = file(
         '[[topics]]\na = "/t"\nmax_rate_hz = 5\n[[topics]]\na = "/r/*"\nb = "/s/*"\ndirection = "b->a"\n'
     )
-    with running(COMMAND, "bridge", "--check", path) as program:
-        out, err = program.end()
-        assert (program.process.returncode, out) == (0, "/t ↔ /t  ≤ 5 /s\n/r/* ← /s/*\n")
-        assert err.startswith("the file is valid: lab connects zeromq:127.0.0.1:")
-    with running(COMMAND, "bridge", "--check", file('[[topics]]\na = "/t"\nmax_rate = 5\n')) as program:
-        _out, err = program.end()
-        assert program.process.returncode == 1
-        assert re.fullmatch(
-            r"nep: line 9 of '.*lab\.toml', topics\[1\]\.max_rate: unknown key; did you mean "
-            r"'max_rate_hz'\?\n",
-            err,
-        )
+    code, out, err = type_in("bridge", "--check", path)
+    assert (code, out) == (0, "/t ↔ /t  ≤ 5 /s\n/r/* ← /s/*\n")
+    assert err.startswith("the file is valid: lab connects zeromq:127.0.0.1:")
+    code, _out, err = type_in("bridge", "--check", file('[[topics]]\na = "/t"\nmax_rate = 5\n'))
+    assert code == 1
+    assert re.fullmatch(
+        r"nep: line 9 of '.*lab\.toml', topics\[1\]\.max_rate: unknown key; did you mean "
+        r"'max_rate_hz'\?\n",
+        err,
+    )
