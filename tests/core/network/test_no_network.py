@@ -64,6 +64,42 @@ def test_firewall_between_studio_and_master_is_reported(tmp_path: Path) -> None:
     assert lines == "1 line"
 
 
+WORK = """
+import sys
+from pathlib import Path
+from app.core.session import Session
+from app.core.storage.settings import Settings
+from tests.core.waiting import tick_until
+
+session = Session(Settings(Path(sys.argv[1])), journal_folder=Path(sys.argv[1]) / "journal")
+session.start()
+tick_until(session, lambda: session.launcher.has_started_master)
+session.launcher.start_virtual_robot("Pepper")
+tick_until(session, lambda: session.fleet.connected)
+link = session.fleet.link("Pepper")
+tick_until(session, lambda: link.chip_text == "virtual, ready")
+with session.fleet.watch_sensors("Pepper"):
+    tick_until(session, lambda: "distance" in link.values)
+said = session.fleet.invoke("Pepper", "say", {"text": "hi"})
+tick_until(session, lambda: not said.is_running)
+walk = session.fleet.invoke("Pepper", "walk", {"distance": 2.0})
+tick_until(session, lambda: link.state == "busy")
+session.runs.stop()
+tick_until(session, lambda: session.runs.view().state == "proven")
+print(said.state, walk.state, [alert.title for alert in session.alerts.active])
+session.close()
+"""
+
+
+def test_session_master_and_robot_work_with_loopback_only(tmp_path: Path) -> None:
+    state = {"NEP_STUDIO_HOME": str(tmp_path / "home"), "NEP_STATE_DIR": str(tmp_path / "state")}
+    done = alone("-c", WORK, str(tmp_path), up=True, timeout_s=120, **state)
+    assert done.stdout == "succeeded canceled []\n", done.stderr
+    assert done.returncode == 0
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.long  # every run includes the same without the window
 @pytest.mark.e2e
 @pytest.mark.slow
 @pytest.mark.timeout(180)
