@@ -182,6 +182,7 @@ GROUPS = (
     Group(
         "interop",  # every run includes tests/interop/gateway and the programs of test_javascript.py
         tests=(
+            "tests/interop/test_csharp.py",
             "tests/interop/test_matrix.py",
             "tests/interop/test_pictures.py",
             "tests/interop/test_programs.py",
@@ -190,13 +191,79 @@ GROUPS = (
             "tests/e2e/test_rize.py",
         ),
         sources=(
+            "clients/",
             "nep/backends/zeromq/",
             "nep/masters/",
             "nep/messages/",
             "nep/programs/gateway/",
             "nep/protocol/",
+            "tests/clients/mono_programs.py",
+            "tests/clients/node_programs.py",
+            "tests/clients/test_directions.py",
             "tests/interop/",
         ),
+    ),
+    Group(
+        "clients in other languages",  # every run includes the exchange of messages and services
+        tests=(
+            "tests/clients/test_csharp",
+            "tests/clients/test_directions.py::listings",
+            "tests/clients/test_javascript.py::_beyond_the_in_flight_limit",
+            "tests/clients/test_javascript.py::blocked_subscriber",
+            "tests/clients/test_javascript.py::conformance_rule",
+            "tests/clients/test_javascript.py::driver_contract",
+            "tests/clients/test_javascript.py::its_own_tests",
+            "tests/clients/test_javascript.py::killed",
+        ),
+        sources=(
+            "app/robots/description/",
+            "clients/",
+            "nep/backends/base.py",
+            "nep/backends/bases/",
+            "nep/backends/tcp.py",
+            "nep/backends/zeromq/",
+            "nep/masters/",
+            "nep/messages/",
+            "nep/programs/conformance/",
+            "nep/protocol/",
+            "tests/clients/mono_programs.py",
+            "tests/clients/node_programs.py",
+            "tests/nep/backends/test_other_clocks.py",
+            "tests/nep/backends/test_unheard_publishers.py",
+            "tests/nep/masters/test_attacks.py",
+            "tests/robots/conftest.py",
+            "tests/robots/driver/driver_program.py",
+            "tests/robots/driver/test_contract.py",
+        ),
+        quick=(
+            "tests/clients/test_csharp.py::test_late_subscriber_receives_latched_message_and_history",
+            "tests/clients/test_csharp.py::test_listing_",
+            "tests/clients/test_csharp.py::test_master_restart_under_traffic_loses_nothing",
+            "tests/clients/test_csharp.py::test_payloads_of_every_type_arrive_in_both_directions",
+            "tests/clients/test_csharp.py::test_services_are_called_in_both_directions",
+            "tests/clients/test_csharp_vectors.py::test_messages_are_decoded_and_encoded_as_in_the_vectors",
+            "tests/clients/test_csharp_zmtp.py::test_sub_socket_sends_sorted_filters",
+        ),
+    ),
+    Group(
+        "rules of the conformance check",  # every run checks a correct client and nep's own with all rules
+        tests=("tests/nep/conformance/test_rules.py::one_error",),
+        sources=(
+            "nep/masters/graph.py",
+            "nep/messages/codecs.py",
+            "nep/programs/conformance/",
+            "nep/protocol/",
+            "tests/nep/conformance/",
+        ),
+    ),
+    Group(
+        "build of the block editor",  # every run checks the files of the committed bundle
+        tests=(
+            "tests/ui/blockly/test_bundle.py::failed_build",
+            "tests/ui/blockly/test_bundle.py::rebuild",
+            "tests/ui/blockly/test_bundle.py::type_checking",
+        ),
+        sources=("app/blocks/editor/", "resources/blockly/"),
     ),
     Group(
         "soak",

@@ -83,6 +83,8 @@ def test_changes_are_unknown_in_a_shallow_clone_and_outside_a_repository(
         ("nep/backends/ros2/names.py", {"ROS 2"}),
         ("nep/backends/ros/transport.py", {"ROS 1"}),
         ("nep/programs/gateway/relay.py", {"interop"}),
+        ("clients/csharp/src/Node.cs", {"clients in other languages", "interop"}),
+        ("app/blocks/editor/src/drag.ts", {"build of the block editor", "menus and drags of the window"}),
         ("tests/nep/backends/test_ros2.py", {"ROS 2"}),
         ("bench/soak.py", {"soak"}),
         ("app/ui/theme/fonts.py", {"high DPI"}),
