@@ -13,8 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
-if sys.platform != "win32":
-    import fcntl
+from tests.clients.build_lock import locked
 
 ROOT = Path(__file__).parents[2]
 CSHARP = ROOT / "clients" / "csharp"
@@ -42,12 +41,10 @@ def program(name: str, *files: Path) -> Path:
 
 
 def _compiled(name: str, files: list[Path], options: tuple[str, ...]) -> Path:
-    """Compile under a file lock, because pytest's workers are processes."""
     BUILD.mkdir(exist_ok=True)
     target = BUILD / name
     needed = [*files, *(Path(each[3:]) for each in options if each.startswith("-r:"))]
-    with (BUILD / "lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+    with locked(BUILD / "lock"):
         if not target.exists() or any(each.stat().st_mtime > target.stat().st_mtime for each in needed):
             made = BUILD / "new" / name  # mcs names the assembly after its file
             made.parent.mkdir(exist_ok=True)

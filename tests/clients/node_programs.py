@@ -7,6 +7,7 @@ import json
 import os
 import shutil
 import subprocess
+import tempfile
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -14,6 +15,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
+from tests.clients.build_lock import locked
 
 PACKAGE = Path(__file__).resolve().parents[2] / "clients" / "javascript"
 ADAPTER = PACKAGE / "conformance" / "adapter.mjs"
@@ -32,20 +35,21 @@ NEEDS_NODE = [
 
 def build_package() -> None:
     """Install the dependencies of nep-js and build it; skip the test if npm can't reach its registry."""
-    if not (PACKAGE / "node_modules" / "zeromq").is_dir():
-        run_npm("ci", "--no-audit", "--no-fund", "--silent")
-    sources = [*(PACKAGE / "src").rglob("*.ts"), PACKAGE / "tsconfig.json", PACKAGE / "build.mjs"]
-    entry = PACKAGE / "dist" / "index.d.mts"
-    if not entry.exists() or entry.stat().st_mtime < max(each.stat().st_mtime for each in sources):
-        done = subprocess.run(
-            [str(npm), "run", "--silent", "build"],
-            cwd=PACKAGE,
-            capture_output=True,
-            text=True,
-            timeout=240,
-            check=False,
-        )
-        assert done.returncode == 0, done.stdout + done.stderr
+    with locked(Path(tempfile.gettempdir()) / "nep-js-build.lock"):
+        if not (PACKAGE / "node_modules" / "zeromq").is_dir():
+            run_npm("ci", "--no-audit", "--no-fund", "--silent")
+        sources = [*(PACKAGE / "src").rglob("*.ts"), PACKAGE / "tsconfig.json", PACKAGE / "build.mjs"]
+        entry = PACKAGE / "dist" / "index.d.mts"
+        if not entry.exists() or entry.stat().st_mtime < max(each.stat().st_mtime for each in sources):
+            done = subprocess.run(
+                [str(npm), "run", "--silent", "build"],
+                cwd=PACKAGE,
+                capture_output=True,
+                text=True,
+                timeout=240,
+                check=False,
+            )
+            assert done.returncode == 0, done.stdout + done.stderr
 
 
 def run_npm(*arguments: str, folder: Path = PACKAGE) -> None:
