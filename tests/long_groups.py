@@ -167,8 +167,13 @@ GROUPS = (
         ),
     ),
     Group(
-        "services of the example back end",  # every run includes its topics: test_example_backend.py
-        tests=("tests/nep/backends/test_example_backend_services.py",),
+        "example back end",  # every run includes its topics without variants: test_example_backend.py
+        tests=(
+            "tests/nep/backends/test_example_backend.py::[",
+            "tests/nep/backends/test_example_backend.py::many_threads",
+            "tests/nep/backends/test_example_backend.py::without_loss",
+            "tests/nep/backends/test_example_backend_services.py",
+        ),
         sources=(
             "examples/backend/",
             "nep/backends/bases/",
@@ -176,6 +181,7 @@ GROUPS = (
             "nep/backends/services.py",
             "nep/protocol/service_wire.py",
             "tests/nep/backends/example_backend.py",
+            "tests/nep/backends/test_contract.py",
             "tests/nep/services/test_calls.py",
         ),
     ),

@@ -78,7 +78,7 @@ def rest(of: Socket) -> list[bytes]:
 @pytest.mark.parametrize("size", [200_000, 4_000_000, 60_000_000])
 def test_buffer_of_a_stalled_subscriber_is_bounded_in_bytes(pair, subscriber, size: int) -> None:
     stuck = subscriber(keep=1)
-    for number in range(5 * MAX_BUFFERED_BYTES // size):
+    for number in range(3 * MAX_BUFFERED_BYTES // size):
         pair.deliver(numbered(number, size))
     kept = rest(stuck)
     assert kept[0].startswith(b't {"n":0')
