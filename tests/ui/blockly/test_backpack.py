@@ -14,7 +14,6 @@ from app.ui.blockly.messages import BackpackMessage, PanelMessage
 from app.ui.panels.build.behaviour.backpack_storage import BackpackController
 from tests.ui.blockly_person import START, Person, workspace
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 WAITS = {

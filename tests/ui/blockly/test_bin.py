@@ -8,7 +8,6 @@ from PySide6.QtCore import QPoint, Qt
 from app.ui.blockly.messages import BlocksDeleted
 from tests.ui.blockly_person import START, WAIT_MS, Person, received, workspace
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 WAITS = {

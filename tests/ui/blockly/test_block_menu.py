@@ -16,7 +16,6 @@ from app.ui.blockly.view import BlocklyView
 from tests.blocks.samples import number, robot, workspace
 from tests.ui.blockly_person import TOKENS, WAIT_MS, Person, editor, outlined
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 ROWS = "[...document.querySelectorAll('.nepMenuRow')].map(e => e.querySelector('span').textContent)"

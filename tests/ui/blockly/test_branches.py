@@ -12,7 +12,6 @@ from tests.blocks.samples import block, boolean, started, text, workspace, write
 from tests.ui.blockly.test_block_menu import choose, looked_at, open_menu
 from tests.ui.blockly_person import WAIT_MS, Person, editor
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 BUTTONS = "document.querySelectorAll('[data-id=if] > .nepButton').length"

@@ -14,7 +14,6 @@ from app.ui.blockly.view import BlocklyView
 from tests.blocks.samples import block, stack, started, text, workspace, write
 from tests.ui.blockly_person import WAIT_MS, Person, editor
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 OFFERED = "[...document.querySelectorAll('.blocklyMenuItemContent')].map(e => e.textContent)"

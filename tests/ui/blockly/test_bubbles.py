@@ -10,7 +10,6 @@ from app.ui.blockly.view import BlocklyView
 from tests.blocks.samples import block, number
 from tests.ui.blockly_person import WAIT_MS, Person, editor, workspace
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 SENTENCE = "“wait” needs a number. Put one into the gap, or delete the block that is in it now."

@@ -18,7 +18,6 @@ from app.ui.blockly.messages import (
 )
 from tests.ui.blockly_person import START, WAIT_MS, Person, received, workspace
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 WAITS = {

@@ -6,7 +6,6 @@ import pytest
 
 from tests.ui.blockly_person import workspace
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 SHOWN = ".nepTab:not([hidden])"

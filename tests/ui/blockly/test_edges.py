@@ -10,7 +10,6 @@ from app.ui.theme import tokens
 from tests.ui.blockly_person import START, TOKENS, WAIT_MS, Person
 from tests.ui.theme.test_tokens import contrast
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 INSIDE = "[...document.querySelectorAll('.blocklyBlockCanvas .nepInside')].map(e => e.dataset.id).sort()"
 SELECTED = "[...document.querySelectorAll('.nepSelection')].map(e => e.parentElement.dataset.id)"

@@ -12,7 +12,6 @@ from app.blocks.model import deep_json
 from app.blocks.model.workspace_json import WorkspaceJson
 from tests.ui.blockly_person import DEFINITIONS, PICTURE, START, UNKNOWN, WAIT_MS, workspace
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 WAIT = {"type": "control_wait", "id": "w", "x": 28, "y": 28}

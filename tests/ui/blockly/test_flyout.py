@@ -11,7 +11,6 @@ from app.ui.blockly.messages import CommandRequested, FlyoutPinned, HistoryChang
 from tests.blocks.samples import nao, robot
 from tests.ui.blockly_person import START, WAIT_MS, Person, editor, received, workspace
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 WIDE, NARROW = 1320, 1000

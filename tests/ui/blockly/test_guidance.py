@@ -12,7 +12,6 @@ from app.ui.blockly.messages import CanvasButtonPressed
 from app.ui.blockly.view import BlocklyView
 from tests.ui.blockly_person import START, Person, received
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 MANY = 12
 SHOWN = "!document.querySelector('.nepBegin').hidden"

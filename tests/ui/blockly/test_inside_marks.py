@@ -11,7 +11,6 @@ from tests.blocks.samples import robot
 from tests.ui.blockly.test_block_menu import choose, double_click, looked_at, open_menu, program
 from tests.ui.blockly_person import TOKENS, WAIT_MS, Person, editor
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 MARKS = (

@@ -14,7 +14,6 @@ from app.ui.blockly.view import BlocklyView
 from tests.blocks.samples import block, list_of, number, robot, started, workspace
 from tests.ui.blockly_person import WAIT_MS, Person, editor
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 FOUND = (("append", "lists_add"), ("loop", "control_repeat"), ("rep fore", "control_forever"))

@@ -14,7 +14,6 @@ from app.ui.shell.actions.shortcuts import FIXED_KEYS
 from tests.blocks.samples import number, robot, started, workspace
 from tests.ui.blockly_person import WAIT_MS, Person, editor
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 LETTERS = [chr(code) for code in range(ord("a"), ord("z") + 1)]

@@ -9,7 +9,6 @@ from PySide6.QtGui import QColor
 from app.ui.blockly.messages import HistoryChanged, SensorsShown
 from tests.ui.blockly_person import DEFINITIONS, PICTURE, START, TOKENS, WAIT_MS, outlined, received
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 

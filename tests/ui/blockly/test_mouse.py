@@ -12,7 +12,6 @@ from app.ui.blockly.messages import HistoryChanged
 from app.ui.blockly.view import BlocklyView
 from tests.ui.blockly_person import DEFINITIONS, START, WAIT_MS, Person, received, workspace
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 

@@ -8,7 +8,6 @@ from PySide6.QtTest import QTest
 
 from tests.ui.blockly_person import START, TOKENS, WAIT_MS, Person
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 BOX = "document.querySelector('.nepTab:not([hidden]) .blocklyToolbox')"
 WIDE = f"{BOX}.getBoundingClientRect().width"

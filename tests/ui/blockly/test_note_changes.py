@@ -13,7 +13,6 @@ from app.ui.blockly.view import BlocklyView
 from tests.blocks.samples import number, robot, started, workspace
 from tests.ui.blockly_person import WAIT_MS, Person, editor
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 ON_BLOCK = {"text": "Ask Maria", "pinned": True, "width": 230, "height": 128, "x": 420, "y": 80}

@@ -21,7 +21,6 @@ from tests.blocks.samples import robot, workspace
 from tests.ui.blockly.test_block_menu import ROWS, choose, looked_at, program
 from tests.ui.blockly_person import TOKENS, WAIT_MS, Person, editor
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 WORDS = "Ask Maria first"

@@ -10,7 +10,6 @@ from app.ui.blockly.view import BlocklyView
 from tests.blocks.samples import number, robot, started, workspace
 from tests.ui.blockly_person import TOKENS, WAIT_MS, Person, editor
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 

@@ -12,7 +12,6 @@ from app.ui.blockly.view import BlocklyView
 from tests.blocks.samples import list_of, number, robot, started, text, workspace
 from tests.ui.blockly_person import TOKENS, WAIT_MS, Person, editor
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 A4 = QPageLayout(QPageSize(QPageSize.PageSizeId.A4), QPageLayout.Orientation.Portrait, QMarginsF())

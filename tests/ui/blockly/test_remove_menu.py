@@ -13,7 +13,6 @@ from app.ui.blockly.view import BlocklyView
 from tests.blocks.samples import call, define, given, list_of, started, text, workspace, write
 from tests.ui.blockly_person import Person, editor
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 MENU = "[...document.querySelectorAll('.blocklyContextMenu .blocklyMenuItem')].map(e => e.textContent)"

@@ -15,7 +15,6 @@ from nep.i18n import install, language
 from tests.blocks.samples import nao, robot
 from tests.ui.blockly_person import START, WAIT_MS, Person, editor, workspace
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 FIELD = ".nepTab:not([hidden]) .nepSearch input"

@@ -13,7 +13,6 @@ from app.ui.blockly.view import BlocklyView
 from tests.blocks.samples import number, robot, started, workspace
 from tests.ui.blockly_person import WAIT_MS, Person, editor, received
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 CHOSEN = "[...document.querySelectorAll('.nepTab:not([hidden]) .nepChosen')].map(e => e.dataset.id).sort()"

@@ -15,7 +15,6 @@ from tests.ui.blockly.test_block_menu import ROWS, looked_at
 from tests.ui.blockly.test_selection import CHOSEN, click, undo, wait_block
 from tests.ui.blockly_person import WAIT_MS, Person, editor, received
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 HEAD = ".blocklyCommentTopbarBackground"

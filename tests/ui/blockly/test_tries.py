@@ -8,7 +8,6 @@ from PySide6.QtCore import Qt
 from app.ui.blockly.messages import StackTried
 from tests.ui.blockly_person import PICTURE, START, WAIT_MS, received
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 HANDLE = ".nepTab:not([hidden]) .nepTryHandle"
 ANSWER = "(e => e && !e.hidden && e.textContent)(document.querySelector('.nepTryAnswer'))"

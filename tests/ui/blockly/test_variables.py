@@ -12,7 +12,6 @@ from app.ui.blockly.view import BlocklyView
 from tests.blocks.samples import block, get, list_of, number, started, workspace, write
 from tests.ui.blockly_person import WAIT_MS, Person, editor, received
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 SAVED = workspace(

@@ -18,7 +18,6 @@ from app.blocks.model.workspace_json import WorkspaceJson
 from app.ui.blockly.view import BlocklyView
 from tests.ui.blockly_person import DEFINITIONS, START, TOKENS, WAIT_MS, Person, outlined, workspace
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 ROOT = Path(__file__).resolve().parents[3]

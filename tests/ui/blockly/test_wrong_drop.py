@@ -9,7 +9,6 @@ from app.blocks.toolbox.definitions import editor_definitions
 from tests.blocks.samples import number, robot
 from tests.ui.blockly_person import START, WAIT_MS, Person, editor, workspace
 
-pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 SAID = "document.querySelector('.nepWhy').textContent"
