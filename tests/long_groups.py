@@ -285,6 +285,11 @@ GROUPS = (
         ),
     ),
     Group(
+        "types of the block editor",  # every run includes the other tests of test_bundle.py
+        tests=("tests/ui/blockly/test_bundle.py::strict_type_checking",),
+        sources=("app/blocks/editor/", "app/ui/blockly/messages.py"),
+    ),
+    Group(
         "high DPI",  # every run includes tests/ui/theme/test_text_sizes.py
         tests=("tests/ui/theme/test_high_dpi.py",),
         sources=(

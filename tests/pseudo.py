@@ -97,7 +97,7 @@ def _marked_in(source: str) -> Iterator[tuple[str | None, str]]:
 def untranslated(text: str, *data: str) -> list[str]:
     """Return the English words of a text, without `data`, markup, units and names."""
     plain = MARKUP.sub(" ", _TAG.sub(" ", text))
-    for each in sorted(filter(None, data), key=len, reverse=True):
+    for each in sorted((each for each in data if each and each in plain), key=len, reverse=True):
         plain = re.sub(rf"(?<![A-Za-z]){re.escape(each)}(?![A-Za-z])", " ", plain)
     return [word for word in _WORD.findall(plain) if word not in UNITS and word not in NAMES]
 

@@ -73,12 +73,11 @@ def test_full_life_cycle_of_each_panel_raises_no_error(qtbot, qapp, name, sessio
     qtbot.addWidget(panel)
     for widget in [*panel.header_widgets(), *([panel.title_widget()] if panel.title_widget() else [])]:
         qtbot.addWidget(widget)
-    for density in ("compact", "comfortable"):
+    for density, mode in (("compact", "light"), ("comfortable", "dark")):
         panel.set_density(density)  # type: ignore[arg-type]
-        for mode in ("light", "dark"):
-            window.theme.set_mode(mode)  # type: ignore[arg-type]
-            ticks(window, panel, 7)
-            assert not panel.grab().isNull()
+        window.theme.set_mode(mode)  # type: ignore[arg-type]
+        ticks(window, panel, 7)
+        assert not panel.grab().isNull()
     for topic in list(window.session.shown.topics):
         panel.show_topic(topic.name)
         ticks(window, panel, 2)
