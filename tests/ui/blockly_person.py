@@ -7,7 +7,7 @@ from collections.abc import Callable
 from operator import attrgetter
 from pathlib import Path
 
-from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtCore import QDeadlineTimer, QEventLoop, QPoint, QPointF, Qt, QTimer
 from PySide6.QtGui import QCursor, QGuiApplication, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
@@ -24,6 +24,7 @@ UNKNOWN = json.loads((DATA / "unknown.json").read_text("utf-8"))
 TOKENS = json.loads(resources.path("theme", "tokens.json").read_text("utf-8"))
 START = {"type": "events_started", "id": "start", "x": 56, "y": 56}
 WAIT_MS = 60_000
+POLL_MS = 20
 PAINTED = "performance.getEntriesByName('first-contentful-paint').length > 0"
 LISTEN = """
 window.nepEvents = [];
@@ -65,11 +66,15 @@ def outlined(name: str) -> str:
 
 
 def editor(qtbot, definitions: dict, width: int = 1180, height: int = 700) -> BlocklyView:
-    """Return a hidden block editor with these definitions; width and height in pixels."""
+    """Return a hidden block editor with these definitions; width and height in pixels.
+
+    Its motion is reduced: each frame of an animation takes as long as several queries.
+    """
     made = BlocklyView()
     qtbot.addWidget(made)
     made.resize(width, height)
     made.set_definitions(definitions)
+    made.set_reduced_motion(True)
     return made
 
 
@@ -84,21 +89,25 @@ class Person:
 
     def ask(self, script: str):
         answers: list = []
-        self.view.web.page.runJavaScript(f"JSON.stringify({script})", answers.append)
-        self._qtbot.waitUntil(lambda: bool(answers), timeout=WAIT_MS)
+        loop = QEventLoop()
+
+        def receive(answer: object) -> None:
+            answers.append(answer)
+            loop.quit()
+
+        self.view.web.page.runJavaScript(f"JSON.stringify({script})", receive)
+        if not answers:
+            QTimer.singleShot(WAIT_MS, loop, loop.quit)
+            loop.exec()
+        assert answers, f"the page didn't answer {script}"
         return json.loads(answers[0]) if answers[0] else None
 
     def wait_for(self, script: str, expected: object = True) -> None:
-        answers: list = []
-
-        def is_so() -> bool:
-            answers[:] = [self.ask(script)]
-            return answers[0] == expected
-
-        try:
-            self._qtbot.waitUntil(is_so, timeout=WAIT_MS)
-        except self._qtbot.TimeoutError as error:
-            raise AssertionError(f"{script} is {answers[0]!r}, not {expected!r}. {self.story()}") from error
+        deadline = QDeadlineTimer(WAIT_MS)
+        while (answer := self.ask(script)) != expected:
+            if deadline.hasExpired():
+                raise AssertionError(f"{script} is {answer!r}, not {expected!r}. {self.story()}")
+            self._qtbot.wait(POLL_MS)
 
     def story(self) -> str:
         """Return the recorded events of the page, and windows that may have received the input instead."""
@@ -132,14 +141,8 @@ class Person:
     def box(self, selector: str) -> dict:
         """Return the rectangle of an element in pixels of the page, once it exists and has stopped moving."""
         self.ask(f"({LOOK})({json.dumps(selector)})")
-        found: list = []
-
-        def is_still() -> bool:
-            found[:] = [self.ask("window.nepStill")]
-            return bool(found[0])
-
-        self._qtbot.waitUntil(is_still, timeout=WAIT_MS)
-        left, top, right, bottom = found[0]
+        self.wait_for("!!window.nepStill")
+        left, top, right, bottom = self.ask("window.nepStill")
         return {"left": left, "top": top, "right": right, "bottom": bottom}
 
     @property

@@ -44,6 +44,7 @@ def test_flat_theme_tokens_are_supported(view, person):
 
 
 def test_running_and_stopped_blocks_are_outlined(view, person):
+    view.set_reduced_motion(False)
     them = person(state=PICTURE)
     view.highlight(["say_touch", "battery"])
     them.wait_for(outlined("running") + ".sort()", ["battery", "say_touch"])

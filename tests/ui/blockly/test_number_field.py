@@ -17,7 +17,6 @@ from tests.blocks.samples import number, started, workspace
 from tests.ui.blockly.test_bundle import EDITOR, built, node, tools  # noqa: F401 (a fixture)
 from tests.ui.blockly_person import Person, editor
 
-
 EXAMPLES = Path(__file__).parents[2] / "data" / "typed_numbers.json"
 SENTENCE = "document.querySelector('.nepTab:not([hidden]) .nepWhy').textContent"
 RUN_EXAMPLES = """

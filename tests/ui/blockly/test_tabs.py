@@ -14,7 +14,6 @@ from app.ui.blockly.messages import HistoryChanged
 from app.ui.blockly.tabs import Tabs
 from tests.ui.blockly_person import DEFINITIONS, START, TOKENS, WAIT_MS, outlined, received, workspace
 
-
 WAIT = {"type": "control_wait", "id": "w", "x": 140, "y": 140}
 A, B = workspace(START), workspace(WAIT)
 PATH = "[data-id=start] > .blocklyPath"
