@@ -9,7 +9,6 @@ from PySide6.QtTest import QSignalSpy, QTest
 from PySide6.QtWidgets import QTableView
 
 from app.ui.theme.theme import Theme
-from app.ui.widgets.table.cells import MAX_CACHED_CELLS
 from app.ui.widgets.table.columns import ColumnChoice
 from app.ui.widgets.table.model import CELL_ROLE, Cell, Column, Order, TableModel
 from app.ui.widgets.table.view import TableView
@@ -166,13 +165,15 @@ def test_cell_that_changed_during_another_repaint_is_repainted(qapp, view, model
     assert brush.painted == QRegion(view.visualRect(model.index(0, 1)))
 
 
-def test_cache_of_painted_cells_is_bounded(qapp, view, model) -> None:
-    model.set_rows([Row(f"{number:05}", 1.0) for number in range(MAX_CACHED_CELLS)])
-    for first in range(0, MAX_CACHED_CELLS, 5):
+def test_cache_of_painted_cells_is_bounded(qapp, view, model, monkeypatch) -> None:
+    limit = 400
+    monkeypatch.setattr("app.ui.widgets.table.cells.MAX_CACHED_CELLS", limit)
+    model.set_rows([Row(f"{number:05}", 1.0) for number in range(limit)])
+    for first in range(0, limit, 5):
         view.scrollTo(model.index(first, 0), QTableView.ScrollHint.PositionAtTop)
         view.viewport().repaint()
         view.refresh_visible()
-    assert len(view._cells._painted_cells) <= MAX_CACHED_CELLS + 50
+    assert len(view._cells._painted_cells) <= limit + 50
 
 
 def test_stretch_column_takes_the_remaining_width(view) -> None:
