@@ -164,7 +164,7 @@ class Maker:
 
 def test_random_workspaces_round_trip(view, person):
     them = person()
-    for seed in range(60):
+    for seed in range(25):
         program = Maker(seed).program()
         view.load(program)
         assert them.newest() == program, f"seed {seed}"
