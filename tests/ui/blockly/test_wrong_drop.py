@@ -79,6 +79,7 @@ def test_invalid_drop_shows_the_reason_and_moves_the_block_off_the_target(
     bubble = them.box(".nepWhy")
     assert abs(bubble["left"] - place.x()) < 80
     assert abs(bubble["top"] - place.y()) < 90
+    them.render()  # an edit becomes an undo step in a later frame
     them.view.undo()
     qtbot.waitUntil(lambda: them.newest() == before, timeout=WAIT_MS)
 
