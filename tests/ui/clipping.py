@@ -30,10 +30,11 @@ ASKED = (QAbstractButton, Chip, StatusItem)
 
 def shown(root: QWidget) -> Iterator[QWidget]:
     """Yield every visible widget below `root`, including those outside of a scroll area's viewport."""
-    behind = [dock for dock in root.findChildren(QDockWidget) if dock.x() < -dock.width() / 2]
+    docks = root.findChildren(QDockWidget)
+    behind = [dock for dock in docks if dock.x() < -dock.width() / 2]  # Qt moves docks behind a tab off-screen
+    hidden = {each for dock in behind for each in dock.findChildren(QWidget)}
     for widget in [root, *root.findChildren(QWidget)]:
-        hidden = any(dock.isAncestorOf(widget) for dock in behind)  # Qt moves docks behind a tab off-screen
-        if widget.isVisibleTo(root) and widget.width() > 0 and not hidden:
+        if widget.isVisibleTo(root) and widget.width() > 0 and widget not in hidden:
             yield widget
 
 
@@ -55,9 +56,10 @@ def longer(text: str) -> str:
 
 def clipped(root: QWidget) -> list[str]:
     """Return a sentence for each widget that is too small for its text."""
-    heads = [widget for widget in shown(root) if isinstance(widget, TableHeader)]
+    widgets = list(shown(root))
+    heads = [widget for widget in widgets if isinstance(widget, TableHeader)]
     return [
-        *(fault for widget in shown(root) for fault in _faults(widget, root)),
+        *(fault for widget in widgets for fault in _faults(widget, root)),
         *(fault for head in heads for fault in _heads(head)),
     ]
 

@@ -110,9 +110,12 @@ class PlainPanel(PanelWidget):
         self.undone.append("rename")
 
 
+REGISTRY = PanelRegistry()
+
+
 def plain(name: str, title: str, accepts: tuple[str, ...]) -> Panel:
     """Return a description with the contributions of the real panel and a `PlainPanel` as widget."""
-    real = PanelRegistry()[name]
+    real = REGISTRY[name]
     return Panel(
         name,
         title,
@@ -126,7 +129,7 @@ def plain(name: str, title: str, accepts: tuple[str, ...]) -> Panel:
 
 
 COMMANDS: list[Command[Any, Any]] = merged(
-    table.COMMANDS, [command for panel in PanelRegistry().values() for command in panel.commands]
+    table.COMMANDS, [command for panel in REGISTRY.values() for command in panel.commands]
 )
 """Commands of the window and of all panels; tests that only need a command of the window can use them too."""
 PANELS = {name: plain(name, title, accepts) for name, (title, accepts) in NAMES.items()}

@@ -21,9 +21,7 @@ from app.ui.text.dates import relative_day_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button
 from app.ui.widgets.buttons import LinkButton
-from nep.i18n import PSEUDO_LANGUAGE, install
 from tests.ui.shell_parts import examples
-from tools.words import compile_all, extract
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 NOW = dt.datetime(2026, 11, 20, 9, 0, tzinfo=dt.timezone.utc)
@@ -241,11 +239,7 @@ def test_first_three_examples_have_a_description_and_preview_rows_that_start_wit
         assert example.rows[0].category == "events"
 
 
-def test_example_titles_and_descriptions_are_translated(monkeypatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("nep.i18n._current", None)
-    extract(tmp_path)
-    compile_all(tmp_path)
-    install(PSEUDO_LANGUAGE, tmp_path)
+def test_example_titles_and_descriptions_are_translated(pseudo) -> None:
     for each in read_examples(resources.folder() / "examples"):
         assert each.name.startswith("[")
         assert each.text.startswith("[")
