@@ -31,7 +31,7 @@ ASKED = (QAbstractButton, Chip, StatusItem)
 def shown(root: QWidget) -> Iterator[QWidget]:
     """Yield every visible widget below `root`, including those outside of a scroll area's viewport."""
     docks = root.findChildren(QDockWidget)
-    behind = [dock for dock in docks if dock.x() < -dock.width() / 2]  # Qt moves docks behind a tab off-screen
+    behind = [dock for dock in docks if dock.x() < -dock.width() / 2]  # Qt moves docks with hidden tabs away
     hidden = {each for dock in behind for each in dock.findChildren(QWidget)}
     for widget in [root, *root.findChildren(QWidget)]:
         if widget.isVisibleTo(root) and widget.width() > 0 and widget not in hidden:

@@ -24,6 +24,7 @@ from app.ui.shell.commands.commands import Commands
 from app.ui.shell.commands.menus import LAYOUT_COMMANDS
 from app.ui.shell.commands.table import COMMANDS, INTENT_COMMANDS, INTENTS, MENUS
 from app.ui.shell.main_window import MainWindow
+from tests.syntax import nodes, parse
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
@@ -58,7 +59,7 @@ def said(node: ast.expr, constants: Constants) -> Iterator[str]:
 
 def named(path: Path) -> Iterator[tuple[str, int]]:
     """Return each command id that a module references and its line."""
-    tree = ast.parse(path.read_text("utf-8"))
+    tree = parse(path)
     constants = {
         target.id: node.value.value
         for node in tree.body
@@ -66,9 +67,7 @@ def named(path: Path) -> Iterator[tuple[str, int]]:
         for target in node.targets
         if isinstance(target, ast.Name) and isinstance(node.value.value, str)
     }
-    for node in ast.walk(tree):
-        if not isinstance(node, ast.Call):
-            continue
+    for node in nodes(tree, ast.Call):
         called = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
         given = []
         if called == "add_argument":  # argparse, not a command of the window
@@ -100,12 +99,14 @@ def found() -> list[tuple[Path, str, int]]:
     return [(path, words, line) for path in modules() for words, line in named(path)]
 
 
+@pytest.mark.usefixtures("syntax_trees")
 def test_command_references_in_core_code_panels_and_buttons_are_collected() -> None:
     words = {words for _, words, _ in found()}
     assert {"layout.{}", "help.doctor", "file.new", "edit.undo", "run.stop"} <= words
     assert len(words) > 25
 
 
+@pytest.mark.usefixtures("syntax_trees")
 def test_every_referenced_command_is_registered() -> None:
     unknown = [f"{path}:{line}: {words!r}" for path, words, line in found() if not is_known(words)]
     assert not unknown, "these name no command"

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QHBoxLayout, QListView, QWidget
 
 import app.ui
 from app.ui.overrides import NEUTRAL_RESULTS
+from tests.syntax import nodes, parse
 
 
 def wrong_number() -> object:
@@ -116,6 +117,7 @@ def test_exception_in_a_method_that_is_no_qt_override_propagates(qapp) -> None:
         Own().count()
 
 
+@pytest.mark.usefixtures("syntax_trees")
 def test_every_qt_override_is_guarded() -> None:
     """A camelCase name is a Qt override: it must be guarded or known to need no guard."""
     # Not called by Qt: called by pyqtgraph while painting, or only declared in a protocol of Qt methods.
@@ -123,8 +125,7 @@ def test_every_qt_override_is_guarded() -> None:
     ours |= {"tickSpacing", "tickStrings"}
     found: set[str] = set()
     for path in Path(app.ui.__file__).parent.rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-            if isinstance(node, ast.ClassDef):
-                found |= {each.name for each in node.body if isinstance(each, ast.FunctionDef)}
+        for node in nodes(parse(path), ast.ClassDef):
+            found |= {each.name for each in node.body if isinstance(each, ast.FunctionDef)}
     qt = {name for name in found if not name.islower() and "_" not in name}
     assert {name for name in qt if name not in NEUTRAL_RESULTS and not name.endswith("Event")} == ours

@@ -89,10 +89,10 @@ def settle(qtbot, root, *, longer: bool) -> None:
     ("full", "percent", "longer"),
     [
         (True, 100, False),
-        (True, 150, True),
-        (True, 200, False),
+        pytest.param(True, 150, True, marks=pytest.mark.long),
+        pytest.param(True, 200, False, marks=pytest.mark.long),
         (True, 200, True),
-        (False, 150, True),
+        pytest.param(False, 150, True, marks=pytest.mark.long),
         (False, 200, True),
     ],
 )
@@ -159,9 +159,9 @@ def whole(qtbot, session: Session, theme: Theme, tmp_path: Path) -> Iterator[tup
     ("size", "percent", "longer"),
     [
         ((1440, 900), 100, False),
-        ((1440, 900), 200, True),
-        ((1100, 700), 150, True),
-        ((1100, 700), 200, False),
+        pytest.param((1440, 900), 200, True, marks=pytest.mark.long),
+        pytest.param((1100, 700), 150, True, marks=pytest.mark.long),
+        pytest.param((1100, 700), 200, False, marks=pytest.mark.long),
         ((1100, 700), 200, True),
         ((1024, 600), 100, False),
         ((1024, 600), 200, False),
