@@ -23,6 +23,11 @@ from xdist.workermanage import WorkerController
 
 _FIXED_PORTS = "fixed ports"
 WITH_FIXED_PORTS = ("tests/interop/", "tests/e2e/test_rize.py")
+_SHARED_STUDIO = "tests/e2e/ with a shared Studio"
+WITH_SHARED_STUDIO = tuple(
+    f"tests/e2e/test_{name}.py" for name in ("ask", "behaviour", "main_job", "run_habits", "stop")
+)
+"""Files whose tests take turns in one Studio (`tests.e2e.shared_studio`), which each worker would start."""
 MOSTLY_WAITING = ("tests/nep/", "tests/clients/", "tests/core/", "tests/robots/", "tests/blocks/")
 """Directories whose tests open no windows and spend at least two thirds of their time waiting."""
 USUAL_S, USUAL_OF_STUDIO_S = 0.2, 12.0
@@ -50,10 +55,13 @@ def may_take(worker: str, workers: int, processors: int, scope: str) -> bool:
 
 
 class FileScheduling(LoadScopeScheduling):
-    """Scheduler that keeps the tests of a file, and all with fixed ports, in one worker; long files first."""
+    """Scheduler that keeps files together that share ports or a Studio; long files first."""
 
     def _split_scope(self, nodeid: str) -> str:
-        return _FIXED_PORTS if nodeid.startswith(WITH_FIXED_PORTS) else nodeid.partition("::")[0]
+        for scope, files in ((_FIXED_PORTS, WITH_FIXED_PORTS), (_SHARED_STUDIO, WITH_SHARED_STUDIO)):
+            if nodeid.startswith(files):
+                return scope
+        return nodeid.partition("::")[0]
 
     def _may_take(self, node: WorkerController, scope: str) -> bool:
         return may_take(node.gateway.id, self.numnodes, os.cpu_count() or 1, scope)

@@ -10,11 +10,14 @@ from pathlib import Path
 import pytest
 
 from dev import virtual_screen
+from tests.e2e.shared_studio import CORNER, SharedStudio
 from tests.e2e.studio import Studio, save_picture, terminate_all
 from tests.e2e.x11 import Screen
 from tests.ports import free_port
 
 HERE = Path(__file__).parent
+_SHARED = "shared"  # the fixture
+_shared_studio = pytest.StashKey[SharedStudio]()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -31,6 +34,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     """Save a picture of the screen when a test fails, before its fixtures are closed."""
     report = yield
+    if (
+        report.failed
+        and _SHARED in getattr(item, "fixturenames", ())
+        and _shared_studio in item.session.stash
+    ):
+        item.session.stash[_shared_studio].mark_spoiled()
     screen = getattr(item, "funcargs", {}).get("screen")
     folder = getattr(item, "funcargs", {}).get("tmp_path")
     if report.when == "call" and report.failed and screen is not None and folder is not None:
@@ -38,6 +47,35 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
             save_picture(screen, folder / "screen.png")
             report.sections.append(("Screen", f"the screen is in {folder / 'screen.png'}"))
     return report
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Restore the state of the shared Studio, before the check for leaks begins."""
+    if _SHARED in getattr(item, "fixturenames", ()) and _shared_studio in item.session.stash:
+        item.session.stash[_shared_studio].prepare()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> Generator[None, None, None]:
+    """Close the shared Studio unless the next test uses it, too."""
+    try:
+        return (yield)
+    finally:
+        if _SHARED not in getattr(nextitem, "fixturenames", ()) and _shared_studio in item.session.stash:
+            item.session.stash[_shared_studio].close()
+
+
+@pytest.fixture(scope="session")
+def shared(
+    request: pytest.FixtureRequest, screen: Screen, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[SharedStudio]:
+    """Studio with the virtual Pepper that is shared between tests; a failed test doesn't affect the next."""
+    studio = SharedStudio(screen, lambda: tmp_path_factory.mktemp("shared"))
+    studio.prepare()
+    request.session.stash[_shared_studio] = studio
+    yield studio
+    studio.close()
 
 
 @pytest.fixture(scope="session")
@@ -66,7 +104,7 @@ def start(screen: Screen, address: str, tmp_path: Path) -> Iterator[Callable[...
         started.append(Studio(screen, tmp_path / "home", address, *arguments, **environment))
         return started[-1].wait_up()
 
-    screen.move(2, 990)
+    screen.move(*CORNER)
     yield start
     screen.let_all_go()
     for studio in started:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from tests.e2e.behaviours import Block, block, say, started, text, write
+from tests.e2e.shared_studio import SharedStudio
 from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
 
@@ -34,11 +34,10 @@ def chooses(words: str, choices: list[str], below: Block) -> Block:
 
 
 @pytest.fixture
-def asking(start: Callable[..., Studio], tmp_path: Path) -> Studio:
+def asking(shared: SharedStudio, tmp_path: Path) -> Studio:
     """Studio that runs a behaviour which asks for a name."""
     script = started(asks("What is your name?", says_the_answer()))
-    studio = start(str(write(tmp_path / "Mine.nepb", script)))
-    studio.use_virtual_pepper()
+    studio = shared.open(write(tmp_path / "Mine.nepb", script))
     studio.click("Run", kind="RunButton")
     studio.says("What is your name?")
     return studio
@@ -65,12 +64,11 @@ def test_pause_keeps_the_question_and_stop_removes_it(asking: Studio) -> None:
 
 
 def test_choice_is_selected_by_key_and_in_the_large_room_by_mouse(
-    start: Callable[..., Studio], tmp_path: Path
+    shared: SharedStudio, tmp_path: Path
 ) -> None:
     last = chooses("Which colour?", ["red", "green", "a blue like the sky"], says_the_answer())
     first = chooses("Play?", ["yes", "no"], last)
-    studio = start(str(write(tmp_path / "Mine.nepb", started(first))))
-    studio.use_virtual_pepper()
+    studio = shared.open(write(tmp_path / "Mine.nepb", started(first)))
     studio.click("Run", kind="RunButton")
     studio.find("yes", kind="ChoiceButton", focus=True)
     studio.screen.key("Right")
@@ -86,10 +84,9 @@ def test_choice_is_selected_by_key_and_in_the_large_room_by_mouse(
     until(lambda: not studio.all(kind="QuestionCard"), "the card goes")
 
 
-def test_stop_removes_the_choices_of_a_question(start: Callable[..., Studio], tmp_path: Path) -> None:
+def test_stop_removes_the_choices_of_a_question(shared: SharedStudio, tmp_path: Path) -> None:
     script = started(chooses("Play?", ["yes", "no"], says_the_answer()))
-    studio = start(str(write(tmp_path / "Mine.nepb", script)))
-    studio.use_virtual_pepper()
+    studio = shared.open(write(tmp_path / "Mine.nepb", script))
     studio.click("Run", kind="RunButton")
     studio.find("yes", kind="ChoiceButton", focus=True)
     studio.click("Stop", kind="StopButton")

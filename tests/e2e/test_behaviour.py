@@ -10,6 +10,7 @@ import pytest
 
 import nep
 from tests.e2e.behaviours import block, forever, number, say, started, turn, write
+from tests.e2e.shared_studio import SharedStudio
 from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
 
@@ -17,15 +18,9 @@ pytestmark = pytest.mark.timeout(400)
 
 
 @pytest.fixture
-def with_robot(start: Callable[..., Studio], tmp_path: Path) -> Callable[[dict], Studio]:
-    """Function that starts Studio with a script and the virtual robot."""
-
-    def open_script(script: dict) -> Studio:
-        studio = start(str(write(tmp_path / "Mine.nepb", script)))
-        studio.use_virtual_pepper()
-        return studio
-
-    return open_script
+def with_robot(shared: SharedStudio, tmp_path: Path) -> Callable[[dict], Studio]:
+    """Function that opens a script in Studio with the virtual robot."""
+    return lambda script: shared.open(write(tmp_path / "Mine.nepb", script))
 
 
 def test_runtime_error_is_shown_as_a_sentence_on_its_block(with_robot: Callable[[dict], Studio]) -> None:
@@ -38,9 +33,7 @@ def test_runtime_error_is_shown_as_a_sentence_on_its_block(with_robot: Callable[
     studio.says("because of an error")
 
 
-def test_behaviour_can_be_paused_stepped_and_resumed(
-    with_robot: Callable[[dict], Studio], address: str
-) -> None:
+def test_behaviour_can_be_paused_stepped_and_resumed(with_robot: Callable[[dict], Studio]) -> None:
     studio = with_robot(started(forever(say("One", say("Two")))))
     studio.click("Run", kind="RunButton")
     studio.says("Pepper says “")
@@ -66,9 +59,8 @@ def test_generated_python_can_be_viewed_and_copied(with_robot: Callable[[dict], 
     studio.spot("[data-id=started]")
 
 
-def test_example_from_the_start_page_runs_to_completion(studio: Studio) -> None:
-    studio.click("Use the virtual robot")
-    studio.says("Pepper ready")
+def test_example_from_the_start_page_runs_to_completion(shared: SharedStudio) -> None:
+    studio = shared.studio
     studio.choose("File", "Start page")
     card = studio.find(kind="ExampleCard")
     studio.screen.click(card["rect"][0] + 60, card["rect"][1] + 60)

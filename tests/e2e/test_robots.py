@@ -1,4 +1,4 @@
-"""Tests of the first use of a real robot, with the permission, the motion and Stop, and of a second robot."""
+"""Tests of the first use of the virtual robots and of a real one, its permission and Stop."""
 
 from __future__ import annotations
 
@@ -64,6 +64,23 @@ def test_real_robot_moves_only_after_permission_which_is_requested_once(table: S
     assert not table.all("Allow motion")
     table.click("Cancel turn")
     table.find("Try turn")
+
+
+def test_start_page_leads_to_a_connected_robot(studio: Studio) -> None:
+    studio.click("Use the virtual robot")
+    studio.says("Pepper ready")
+    studio.says("virtual, ready")
+    studio.find("Stop", kind="StopButton", enabled=True)
+    studio.open_category("Movement")
+
+    def colours() -> int:
+        drawing = studio.picture(studio.find(kind="RoomView"))
+        return len({tuple(pixel) for pixel in drawing[::7, ::7].reshape(-1, 3)})
+
+    until(lambda: colours() > 20, "the room is drawn")
+    (robot,) = studio.children("app.robots.simulated")
+    assert studio.quit() == 0
+    until(lambda: not robot.is_running(), "the virtual robot ends with its window")
 
 
 def test_virtual_turtle_connects_and_moves_without_a_motion_permission(start: Callable[..., Studio]) -> None:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from tests.e2e.behaviours import forever, say, started, turn, write
+from tests.e2e.shared_studio import SharedStudio
 from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
 
@@ -40,12 +40,11 @@ def lasts(studio: Studio) -> None:
 
 
 @pytest.fixture
-def turning(start: Callable[..., Studio], tmp_path: Path) -> Studio:
+def turning(shared: SharedStudio, tmp_path: Path) -> Studio:
     """Studio that runs a behaviour which turns the virtual robot in an endless loop."""
     speech = {**say("Round and round"), "x": 420, "y": 56}
     path = write(tmp_path / "Turning.nepb", started(forever(turn(300))), speech)
-    studio = start(str(path))
-    studio.use_virtual_pepper("turn")
+    studio = shared.open(path)
     studio.click("Run", kind="RunButton")
     until(lambda: "turn" in studio.outlined("running"), "the block glows")
     return studio

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import pytest
 import nep
 from tests.e2e.behaviours import block, forever, say, started, turn, write
 from tests.e2e.person import Seen, middle
+from tests.e2e.shared_studio import SharedStudio
 from tests.e2e.studio import Studio
 from tests.e2e.waiting import until
 from tests.e2e.x11 import RIGHT
@@ -19,14 +19,13 @@ pytestmark = pytest.mark.timeout(400)
 
 
 @pytest.fixture
-def turning(start: Callable[..., Studio], tmp_path: Path) -> Studio:
+def turning(shared: SharedStudio, tmp_path: Path) -> Studio:
     """Studio that runs a behaviour which turns the virtual robot in an endless loop."""
     speech = {**say("Round and round"), "x": 420, "y": 56}
     lights = {"ROBOT": "Pepper", "WHERE": "eyes", "COLOUR": "#35b0fa"}
     light = {**block("robot_pepper_do_light", fields=lights), "x": 56, "y": 360}
     path = write(tmp_path / "Turning.nepb", started(forever(turn(300))), speech, light)
-    studio = start(str(path))
-    studio.use_virtual_pepper("turn")
+    studio = shared.open(path)
     studio.click("Run", kind="RunButton")
     until(lambda: "turn" in studio.outlined("running"), "the block glows")
     return studio
@@ -40,6 +39,12 @@ def run_again(studio: Studio) -> None:
 
 def stands_still(studio: Studio) -> None:
     """Check that the stop is confirmed, the published state stays still and the program has ended."""
+
+    def can_run() -> bool:
+        """Until Run is enabled, the text is that of an earlier stop; the Developer layout shows none."""
+        return bool(studio.all("Run", kind="RunButton", enabled=True)) or not studio.all(kind="RunButton")
+
+    until(can_run, "the behaviour has stopped")
     studio.says("Pepper stopped (")
     with nep.node("listener", master=studio.master) as node:
         states = node.new_sub("/Pepper/state", "json")
@@ -48,12 +53,6 @@ def stands_still(studio: Studio) -> None:
     assert len({state["theta_deg"] for state in heard}) == 1
     until(lambda: not studio.programs(), "the program's process has ended")
     until(lambda: not studio.outlined("running"), "nothing glows any more")
-
-
-def stands_still_again(studio: Studio) -> None:
-    """Check the standstill after another run, once the text of the previous stop is replaced."""
-    studio.find("Run", kind="RunButton", enabled=True)
-    stands_still(studio)
 
 
 def test_f12_in_the_web_view_stops(turning: Studio) -> None:
@@ -73,19 +72,23 @@ def test_ctrl_period_while_a_block_text_is_edited_stops(turning: Studio) -> None
     stands_still(turning)
 
 
+def filter_topics(studio: Studio, words: str) -> None:
+    """Replace the filter of the topics in the Developer layout, which keeps the previous one."""
+    studio.click("Developer")
+    studio.click("Filter topics")
+    studio.screen.key("a", ["Ctrl"])
+    studio.screen.type(words)
+
+
 def test_f12_in_a_field_of_the_developer_layout_stops(turning: Studio) -> None:
-    turning.click("Developer")
-    turning.click("Filter topics")
-    turning.screen.type("pose")
+    filter_topics(turning, "pose")
     turning.row("Topics", "/Pepper/pose")
     turning.screen.key("F12")
     stands_still(turning)
 
 
 def test_f12_during_the_drag_of_a_field_stops(turning: Studio) -> None:
-    turning.click("Developer")
-    turning.click("Filter topics")
-    turning.screen.type("pose")
+    filter_topics(turning, "pose")
     until(lambda: len(turning.rows("Topics")) == 1, "only the topic of the pose is listed")
     turning.click_row("Topics", "/Pepper/pose")
     x, y = middle(turning.still_row("Newest message", "theta")["rect"])
@@ -107,7 +110,7 @@ def test_stop_works_while_blocks_are_dragged_or_a_block_field_is_edited(turning:
     turning.screen.glide(left + 160, top + 90)
     until(lambda: turning.page("!!document.querySelector('.blocklyDragging')"), "the block is in the hand")
     turning.screen.key("F12")
-    stands_still_again(turning)
+    stands_still(turning)
     turning.screen.release()
     until(lambda: not turning.page("!!document.querySelector('.blocklyDragging')"), "the block is put down")
     assert sorted(turning.blocks()) == before
@@ -127,7 +130,7 @@ def test_stop_works_while_blocks_are_dragged_or_a_block_field_is_edited(turning:
     number = "document.querySelector('.nepPalette input').value"
     until(lambda: turning.page(number) == "#12", "the number is typed")
     turning.screen.key(".", ["Ctrl"])
-    stands_still_again(turning)
+    stands_still(turning)
     assert turning.page(number) == "#12", "as it was typed"
     turning.screen.key("Escape")
     until(lambda: not turning.page("!!document.querySelector('.nepPalette')"), "the palette is closed")
@@ -136,7 +139,7 @@ def test_stop_works_while_blocks_are_dragged_or_a_block_field_is_edited(turning:
     turning.point("[data-id=turn] .blocklyDropdownField", dx=10, dy=10)
     turning.spot(".blocklyDropDownDiv .blocklyMenuItem")
     turning.screen.click(*middle(turning.find(kind="StopButton")["rect"]))
-    stands_still_again(turning)
+    stands_still(turning)
 
 
 def menus(studio: Studio) -> list[Seen]:
