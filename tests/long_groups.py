@@ -68,6 +68,7 @@ GROUPS = (
             "tests/e2e/test_tabs.py",
             "tests/e2e/test_two_studios.py",
             "tests/e2e/test_unsaved_work.py::tab_order",
+            "tests/e2e/test_unsaved_work.py::after_quit",
             "tests/e2e/test_unsaved_work.py::discarded",
             "tests/e2e/test_virtual_robots.py",
         ),
@@ -148,6 +149,11 @@ GROUPS = (
             "tests/nep/backends/test_ros.py::test_nep_receives_messages_from_a_ros_program",
             "tests/nep/backends/test_ros_services.py::test_ros_client_calls_a_nep_server",
         ),
+    ),
+    Group(
+        "concurrent self-tests",  # every run includes a self-test with the editor and one that fails
+        tests=("tests/e2e/test_self_test.py::without_editor",),
+        sources=("app/__main__.py", "app/core/self_test/", "app/ui/self_test.py"),
     ),
     Group(
         "ROS 2",  # every run includes the contract over Cyclone DDS: test_ros2.py[test_contract.py-]

@@ -15,6 +15,7 @@ E2E_NAMES = (
     "restarts of the window",
     "questions and edits of running programs",
     "menus and drags of the window",
+    "concurrent self-tests",
     "interop",
     "soak",
 )

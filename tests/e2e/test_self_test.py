@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
@@ -81,18 +80,6 @@ class Tried:
         until(lambda: not self.left(), lambda: f"all have ended: {self.left()}")
 
 
-@pytest.fixture(scope="module")
-def both(screen: Screen, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Tried, Tried]]:
-    """Two concurrent self-tests on the same screen: with the block editor and without it."""
-    folder = tmp_path_factory.mktemp("自己 テスト")
-    web = Tried(screen, folder / "with")
-    plain = Tried(screen, folder / "without", "--no-web", begin=("-c", NO_WEB))
-    with web.program, plain.program:
-        web.program.wait(360)
-        plain.program.wait(360)
-        yield web, plain
-
-
 def went_well(tried: Tried, *names: str) -> None:
     assert tried.program.process.returncode == 0, (tried.report["why"], tried.program.lines[-5:])
     report, steps = tried.report, tried.steps()
@@ -111,16 +98,30 @@ def picture(tried: Tried) -> np.ndarray:
     return cv2.imdecode(data, cv2.IMREAD_COLOR)
 
 
-def test_self_test_with_editor_passes_every_step_and_leaves_no_process(both: tuple[Tried, Tried]) -> None:
-    tried, _other = both
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    folder = tmp_path / "自己 テスト"
+    folder.mkdir()
+    return folder
+
+
+def test_self_test_with_editor_passes_every_step_and_leaves_no_process(screen: Screen, folder: Path) -> None:
+    tried = Tried(screen, folder / "with")
+    with tried.program as program:
+        program.wait(360)
     went_well(tried, *ALWAYS[:5], "editor", *ALWAYS[5:], "processes")
     assert tried.report["first_paint_ms"] < tried.report["editor_ready_ms"] < tried.report["total_ms"]
     blue = (picture(tried) == (182, 76, 41)).all(axis=2)  # the colour of blocks of robot actions
     assert blue[200:700, 230:600].mean() > 0.1
 
 
-def test_self_test_without_editor_passes_while_another_self_test_runs(both: tuple[Tried, Tried]) -> None:
-    _other, tried = both
+def test_self_test_without_editor_passes_while_another_self_test_runs(screen: Screen, folder: Path) -> None:
+    other = Tried(screen, folder / "with")
+    tried = Tried(screen, folder / "without", "--no-web", begin=("-c", NO_WEB))
+    with other.program, tried.program:
+        other.program.wait(360)
+        tried.program.wait(360)
+    went_well(other, *ALWAYS[:5], "editor", *ALWAYS[5:], "processes")
     went_well(tried, *ALWAYS, "processes")
     assert tried.report["editor_ready_ms"] is None
     assert not tried.report["web"]

@@ -73,15 +73,24 @@ def test_unsaved_work_is_offered_and_restored_after_kill_9(
     assert b"control_wait" in path.read_bytes()
     assert again.quit() == 0
 
-    third = start()
-    until(lambda: set(third.blocks()) == edited, "what was worked on last shows")
-    assert not third.all("Restore")
-    third.choose("File", "Start page")
-    third.find(kind="StartPage")
-    assert third.quit() == 0
 
-    fourth = start()
-    fourth.find(kind="StartPage")
+def test_last_behaviour_or_the_start_page_is_shown_after_quit(
+    start: Callable[..., Studio], tmp_path: Path
+) -> None:
+    studio = start(str(write(tmp_path / "Mine.nepb", started(say("Hello")))))
+    studio.spot("[data-id=started]")
+    blocks = set(studio.blocks())
+    assert studio.quit() == 0
+
+    again = start()
+    until(lambda: set(again.blocks()) == blocks, "what was worked on last shows")
+    assert not again.all("Restore")
+    again.choose("File", "Start page")
+    again.find(kind="StartPage")
+    assert again.quit() == 0
+
+    third = start()
+    third.find(kind="StartPage")
 
 
 def test_active_tab_and_tab_order_are_restored_after_kill_9(
