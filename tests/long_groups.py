@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import subprocess
 from collections.abc import Iterable, Sequence
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -38,14 +39,23 @@ class Group(NamedTuple):
     @property
     def files(self) -> tuple[str, ...]:
         """Prefixes of the paths of the test files."""
-        return tuple(prefix.partition("::")[0] for prefix in self.tests)
+        return _files(self)
 
     def includes(self, node_id: str) -> bool:
         """Return True for a test of the group."""
-        return not node_id.startswith(self.quick) and any(
-            node_id.startswith(path) and part in node_id
-            for path, _, part in (prefix.partition("::") for prefix in self.tests)
+        return (
+            node_id.startswith(_files(self))
+            and not node_id.startswith(self.quick)
+            and any(
+                node_id.startswith(path) and part in node_id
+                for path, _, part in (prefix.partition("::") for prefix in self.tests)
+            )
         )
+
+
+@cache
+def _files(group: Group) -> tuple[str, ...]:
+    return tuple(prefix.partition("::")[0] for prefix in group.tests)
 
 
 GROUPS = (

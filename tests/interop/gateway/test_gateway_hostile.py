@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from nep.programs.gateway.framing import FrameError, FrameFormat
 from nep.programs.gateway.requests import Request, RequestError, parse_request
+from tests.examples import examples
 
 pytestmark = [pytest.mark.ports]
 
@@ -40,11 +41,13 @@ FRAMES = (
     | st.just(b"t " + b"[" * 100_000)
     | st.just(b"t" * 3_000_000)
 )
-quick = settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+quick = settings(
+    max_examples=examples(60), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 
 
 @given(REQUESTS, st.sampled_from([7000, 50000]))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 def test_request_is_parsed_or_rejected_with_a_message(data, port):
     try:
         understood = isinstance(parse_request(data, port), Request)
@@ -54,7 +57,7 @@ def test_request_is_parsed_or_rejected_with_a_message(data, port):
 
 
 @given(FRAMES, st.sampled_from(["prefixed", "bare"]), st.sampled_from(["json", "string", "image", "bytes"]))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 def test_frame_is_parsed_or_rejected_with_a_frame_error(frame, framing, codec):
     shape = FrameFormat("t", framing, codec)
     try:

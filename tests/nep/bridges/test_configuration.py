@@ -20,6 +20,7 @@ from nep.programs.bridges import (
     side_configuration,
 )
 from nep.programs.bridges.toml_file import EXAMPLE, parse_configuration
+from tests.examples import examples
 
 SIDES = '[a]\nbackend = "zeromq"\n[b]\nbackend = "zenoh"\n'
 ONE = '[[topics]]\na = "/t"\n'
@@ -220,13 +221,13 @@ def reads_or_says(text):
     assert found.topics
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(400), deadline=None)
 @given(st.dictionaries(words, values, max_size=4))
 def test_any_toml_is_parsed_or_rejected_with_a_message(table):
     reads_or_says("".join(f"{toml(key)} = {toml(value)}\n" for key, value in table.items()))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(400), deadline=None)
 @given(
     st.lists(st.dictionaries(words, scalars, max_size=4), min_size=1, max_size=3),
     st.dictionaries(words, scalars),
@@ -236,14 +237,14 @@ def test_any_topics_and_sides_are_parsed_or_rejected_with_a_message(topics, side
     reads_or_says(head)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 @given(st.text(max_size=200))
 def test_any_configuration_text_is_parsed_or_rejected_with_a_message(text):
     reads_or_says(text)
     reads_or_says(SIDES + ONE + text)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 @given(st.text(max_size=30), st.text(max_size=30))
 def test_any_two_side_arguments_are_parsed_or_rejected_with_a_message(a, b):
     for pair in ((a, b), (f"zeromq:{a}", f"zenoh:{b}"), (f"zeromq@{a}:/t", f"zenoh@{b}:/t")):
@@ -270,7 +271,7 @@ def test_wildcard_captures_part_of_a_topic(pattern, topic, part):
         assert end.with_part(part) == topic
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 @given(st.sampled_from(["/a/*", "/*/b", "x**", "**/y", "*"]), st.text("ab/xy*", min_size=1, max_size=8))
 def test_wildcard_substitution_round_trips(pattern, part):
     end = TopicEnd(pattern)

@@ -32,6 +32,7 @@ from nep.protocol.requests import (
     SubscriberCount,
     SubscriberRecord,
 )
+from tests.examples import examples
 from tests.nep.programs import eventually
 
 EPOCH = 5
@@ -158,7 +159,7 @@ KINDS = st.sampled_from(["join", "leave", "renew", "remove", "alert", "retype"])
 CHANGES = st.lists(st.tuples(KINDS, st.integers(0, 4)))
 
 
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=examples(60))
 @given(CHANGES)
 def test_incremental_view_matches_a_full_view(changes: list[tuple[str, int]]) -> None:
     graph = graph_of(3)

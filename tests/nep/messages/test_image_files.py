@@ -19,6 +19,7 @@ from nep.errors import DecodeError, EncodeError
 from nep.messages import image_codec
 from nep.messages.codecs import codec
 from nep.messages.image_files import MAX_PIXELS, check_size, parse_header
+from tests.examples import examples
 from tests.nep import bad_pictures as bad
 
 REPOSITORY = Path(__file__).resolve().parents[3]
@@ -157,7 +158,7 @@ FILE_PNG = cv2.imencode(".png", scene())[1].tobytes()
     st.lists(st.tuples(st.integers(0, 700), st.integers(0, 255)), max_size=4),
     st.integers(0, 2000),
 )
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 def test_decoded_image_has_the_size_in_its_header_despite_corruption(
     data: bytes, changes: list[tuple[int, int]], end: int
 ) -> None:

@@ -19,6 +19,7 @@ from nep.errors import DecodeError, EncodeError
 from nep.messages.codecs import codec
 from nep.messages.nesting import MAX_LEVELS, is_json_too_deep, is_packed_too_deep
 from nep.messages.packing import pack
+from tests.examples import examples
 
 SENTENCE = "the value has more than 64 levels of lists and maps"
 
@@ -90,7 +91,7 @@ def levels_of(value: object) -> int:
     return 1 + max(map(levels_of, value.values()), default=0) if isinstance(value, dict) else 0
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(150))
 @given(JSON_VALUES, st.integers(0, 80))
 def test_depth_check_of_json_bytes_matches_depth_of_the_value(value: object, around: int) -> None:
     for _level in range(around):
@@ -115,7 +116,7 @@ PACKED_VALUES = st.recursive(
 )
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(150))
 @given(PACKED_VALUES, st.integers(50, 70), st.sampled_from(["list", "tuple", "map"]))
 def test_depth_check_of_decoded_msgpack_matches_depth_of_the_value(
     value: object, around: int, kind: str

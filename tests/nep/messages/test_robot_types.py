@@ -16,6 +16,7 @@ from nep.geometry import Header, PoseStamped, Quaternion, Time
 from nep.messages.codecs import JSON, Codec
 from nep.messages.message import MessageKind, received_message
 from nep.messages.typed import TypedReader, message_type, typed_codec
+from tests.examples import examples
 
 
 def through(payload: Any, codec: Codec = JSON) -> Any:
@@ -109,7 +110,7 @@ _angles = st.floats(-math.pi, math.pi)
 
 
 @given(_angles, st.floats(-1.57, 1.57), _angles)
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 def test_euler_angles_round_trip_through_quaternion(roll: float, pitch: float, yaw: float) -> None:
     turned = Quaternion.from_euler(roll, pitch, yaw)
     again = Quaternion.from_euler(*turned.to_euler())
@@ -119,7 +120,7 @@ def test_euler_angles_round_trip_through_quaternion(roll: float, pitch: float, y
 
 
 @given(_angles, st.sampled_from([-math.pi / 2, math.pi / 2]), _angles)
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 def test_euler_conversion_preserves_rotation_at_gimbal_lock(roll: float, pitch: float, yaw: float) -> None:
     turned = Quaternion.from_euler(roll, pitch, yaw)
     again = Quaternion.from_euler(*turned.to_euler())

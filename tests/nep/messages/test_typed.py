@@ -23,6 +23,7 @@ from nep.geometry import Header, Point, Pose, PoseStamped, Quaternion, Time, Twi
 from nep.messages.codecs import CODECS, JSON
 from nep.messages.message import Message
 from nep.messages.typed import TypedReader, message_type, typed_codec
+from tests.examples import examples
 from tests.nep.programs import running
 
 
@@ -177,7 +178,7 @@ _everything = st.builds(
 
 
 @given(_everything)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 def test_typed_message_round_trip_preserves_values_and_types(payload: Everything) -> None:
     encoded = typed_codec(message_type(Everything), JSON).encode(payload)
     came = read_bytes(Everything, encoded.data)
@@ -194,7 +195,7 @@ def test_typed_message_round_trip_preserves_values_and_types(payload: Everything
         st.dictionaries(st.sampled_from([each.name for each in fields(Everything)]), each, max_size=12),
     ),
 ))  # fmt: skip
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 def test_arbitrary_payload_becomes_an_instance_or_raises_decode_error(plain: object) -> None:
     for declared in (Everything, PoseStamped, Part, Tree):
         try:

@@ -36,9 +36,10 @@ from nep.protocol.requests import (
     SubscriberCount,
     SubscriberRecord,
 )
+from tests.examples import examples
 from tests.nep.programs import eventually
 
-MANY = settings(deadline=None, max_examples=25, suppress_health_check=list(HealthCheck))
+MANY = settings(deadline=None, max_examples=examples(60), suppress_health_check=list(HealthCheck))
 EDGES = [0, 1, -1, 2**31, 2**32, 2**53, 2**63 - 1, 2**63, 2**64 - 1, 2**64, -(2**63), -(2**63) - 1, 2**200]
 INTS = st.sampled_from(EDGES) | st.integers(-(2**70), 2**70)
 ON_THE_WIRE = st.sampled_from([each for each in EDGES if -(2**63) <= each < 2**64]) | st.integers(
@@ -108,7 +109,7 @@ def test_arbitrary_requests_and_replies_raise_only_wire_errors(name: str, what: 
             encoding.decode_reply(pack_saturated({"is": answer, "re": call, "what": what}))
 
 
-@settings(MANY, max_examples=60)
+@settings(MANY, max_examples=examples(150))
 @given(st.lists(st.one_of(*(of(kind, ON_THE_WIRE) for kind in ASKED)), max_size=12), st.booleans())
 def test_arbitrary_requests_do_not_raise_in_the_graph_or_break_its_view(
     asked: list[Request], is_foreign: bool
