@@ -285,7 +285,7 @@ GROUPS = (
             "tests/ui/blockly/test_bundle.py::rebuild",
             "tests/ui/blockly/test_bundle.py::type_checking",
         ),
-        sources=("app/blocks/editor/", "resources/blockly/"),
+        sources=("app/blocks/editor/", "app/ui/blockly/messages.py", "resources/blockly/"),
     ),
     Group(
         "soak",
@@ -299,11 +299,6 @@ GROUPS = (
             "bench/studio_window.py",
             "nep/backends/zeromq/",
         ),
-    ),
-    Group(
-        "types of the block editor",  # every run includes the other tests of test_bundle.py
-        tests=("tests/ui/blockly/test_bundle.py::strict_type_checking",),
-        sources=("app/blocks/editor/", "app/ui/blockly/messages.py"),
     ),
     Group(
         "high DPI",  # every run includes tests/ui/theme/test_text_sizes.py
