@@ -59,7 +59,7 @@ class Turtle:
         self.done: list[object] = []
         self.go_on = threading.Event()
         self.moving = False
-        self.stops = 0
+        self.stop_calls = self.stops = 0  # calls of `stop` that have begun, and those that have ended
         self.may_stop = threading.Event()
         self.may_stop.set()
         self.is_closed = False
@@ -121,6 +121,7 @@ class Turtle:
     @safe_stop(watchdog_s=1.0, within_s=0.2)
     def stop(self) -> None:
         """Stop the motion once the test sets `may_stop`."""
+        self.stop_calls += 1
         self.may_stop.wait(60)
         if self.stop_fails is not None:
             raise self.stop_fails

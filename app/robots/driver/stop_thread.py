@@ -41,7 +41,7 @@ class StopThread:
         self._lock = threading.Lock()
         self._wake = clock.event()
         self._is_closing = False
-        self._requested_run = self._finished_run = 0
+        self._requested_run = self._started_run = self._finished_run = 0
         self._thread: threading.Thread | None = None
 
     def start(self) -> None:
@@ -60,6 +60,13 @@ class StopThread:
         """
         with self._lock:
             if self._requested_run == self._finished_run:
+                self._requested_run += 1
+            return self._requested_run
+
+    def reserve_next(self) -> int:
+        """Reserve a run that has not begun yet and return its number; `wake` starts the run."""
+        with self._lock:
+            if self._requested_run == self._started_run:
                 self._requested_run += 1
             return self._requested_run
 
@@ -82,13 +89,15 @@ class StopThread:
                         self._clock.wait(self._wake, None)
                     self._wake.clear()
                     if self._requested_run > self._finished_run:
-                        self._run(self._requested_run)
+                        self._run()
         finally:
             if not self._is_closing:  # an exception was injected outside of the try block
                 self._wake.set()
                 self.start()
 
-    def _run(self, run: int) -> None:
+    def _run(self) -> None:
+        with self._lock:
+            run = self._started_run = self._requested_run
         error: str | None = _(MAY_MOVE_MESSAGE).format(robot=self._name, why=_("the stop command failed"))
         try:
             error = self._call_stop()

@@ -535,10 +535,10 @@ class Tasks:
             self._running.remove(task)
         if reply.state == "succeeded" and task.final_reply is None:
             self._watchdog.record_success(task)
-        if task.is_stopped and not self._is_stopping:
-            # It may have moved the robot after the stop, so the robot is stopped again.
-            self._is_stop_late = task.has_replied
-            run = self._stop_thread.reserve()
+        if task.is_stopped:
+            # It may have moved the robot after the stop function began, so the robot is stopped again.
+            self._is_stop_late = self._is_stop_late or task.has_replied
+            run = self._stop_thread.reserve_next()
             self._stop_thread.wake()
             self._pending_stops = [pending._replace(run=run) for pending in self._pending_stops]
         # A function that was asked to end may return normally; the requested ending counts.
@@ -554,7 +554,7 @@ class Tasks:
 
     def _handle_stop_end(self, run: int, error: str | None) -> None:
         self._ended_run, self._ended_error = run, error
-        self._is_stop_late = False
+        self._is_stop_late = self._is_stop_late and self._is_stopping
         if error is None:
             self._unrequested_stop_error = None
             self._complete_stops()
@@ -562,6 +562,8 @@ class Tasks:
         failed = TaskReply("failed", error=error)
         answered = [pending for pending in self._pending_stops if pending.run <= run]
         self._pending_stops = [pending for pending in self._pending_stops if pending.run > run]
+        if not answered and self._is_stopping:
+            return  # the next run decides
         if not answered:
             self._record_unrequested_stop(failed)  # the requesters have already received a failure reply
         elif self._unrequested_stop_error is not None:

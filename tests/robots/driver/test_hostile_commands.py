@@ -167,7 +167,7 @@ def test_large_stop_command_is_executed(busy, order):
     assert ears.final("s", "stop")["state"] == "succeeded"
 
 
-def test_stop_is_confirmed_only_by_a_stop_call_that_ended_after_the_last_action(turtle):
+def test_stop_is_confirmed_only_by_a_stop_call_that_began_after_the_last_action(turtle):
     """An action that outlives the stop function may have moved the robot again."""
     body, ears, _clock = turtle
     ears.invoke("1", "ignore")
@@ -178,6 +178,22 @@ def test_stop_is_confirmed_only_by_a_stop_call_that_ended_after_the_last_action(
     body.go_on.set()
     assert ears.final("s", "stop")["state"] == "succeeded"
     assert body.stops == 2
+
+
+def test_stop_function_that_runs_while_an_action_ends_is_called_again(turtle):
+    """The action may have moved the robot after the function had stopped its motors."""
+    body, ears, _clock = turtle
+    ears.invoke("1", "ignore")
+    eventually(lambda: "running" in ears.states("1"))
+    body.may_stop.clear()
+    ears.command(id="s", op="stop")
+    eventually(lambda: body.stop_calls == 1)
+    body.go_on.set()
+    assert ears.final("1")["state"] == "canceled"
+    assert ears.states("s") == []
+    body.may_stop.set()
+    assert ears.final("s", "stop")["state"] == "succeeded"
+    assert (body.stop_calls, body.stops) == (2, 2)
 
 
 # ---- ended threads
