@@ -46,6 +46,7 @@ _TEXT = rf"{_STRING}(?:{_GAP}{_STRING})*"
 _CALL = re.compile(  # parsing all sources with ast takes nine times as long
     rf"(?<![\w.])({'|'.join(MARKS)})\({_GAP}({_TEXT}){_GAP}(?:,{_GAP}({_TEXT}){_GAP})?(?=[,)])"
 )
+_MODULE_DOCSTRING = re.compile(r'\A"""[\s\S]*?"""')
 _WORD = re.compile(r"[A-Za-z][A-Za-z']+")
 _TAG = re.compile(r"<[^<>]*>|&[a-z]+;")
 _PATTERN = {"2": "[{0} àñđ {1}]", "start": "{0}, {1}", "middle": "{0}, {1}", "end": "[{0} àñđ {1}]"}
@@ -88,7 +89,7 @@ def marked() -> frozenset[tuple[str | None, str]]:
 
 
 def _marked_in(source: str) -> Iterator[tuple[str | None, str]]:
-    for mark, *literals in _CALL.findall(source):
+    for mark, *literals in _CALL.findall(_MODULE_DOCSTRING.sub("", source)):
         given = [ast.literal_eval(f"({each})") for each in literals if each][: MARKS[mark]]
         if len(given) == MARKS[mark]:
             yield (None, given[0]) if len(given) == 1 else (given[0], given[1])

@@ -304,13 +304,13 @@ def find_backend(name: str) -> Backend:
         UnknownBackendError: No back end has this name.
         TooManyFilesError: The process is out of file descriptors.
     """
-    found = find_own("nep.backends", name.lower(), "BACKEND", Backend)
-    if found is not None:  # without importing the other back ends, which takes longer than the rest of nep
-        return found
     try:
+        found = find_own("nep.backends", name.lower(), "BACKEND", Backend)
+        if found is not None:  # without importing the others, which takes longer than the rest of nep
+            return found
         own_backends = discover_own("nep.backends", "BACKEND", Backend)
-    except PluginsMissingError:
-        check_free_descriptors(1, "a node")  # listing a folder without a free descriptor finds no files
+    except (PluginsMissingError, OSError):
+        check_free_descriptors(1, "a node")  # without a free descriptor, no file can be found or opened
         raise
     backend = _find_by_name(name.lower(), own_backends.values())
     if backend is None:

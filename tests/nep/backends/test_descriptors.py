@@ -82,7 +82,7 @@ try:
         taken.append(os.dup(0))
 except OSError:
     pass
-for do in (lambda: node.new_pub("x"), lambda: node.new_sub("x"), lambda: nep.node("y"),
+for do in (lambda: node.new_pub("x"), lambda: node.new_sub("x"), lambda: nep.node("y").new_pub("x"),
            lambda: nep.master("127.0.0.1:0").start(), lambda: sub.listen(timeout_s=0.01)):
     refused(do)
 pub.publish(1)
