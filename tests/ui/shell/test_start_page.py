@@ -308,3 +308,12 @@ def test_first_row_of_examples_is_shown_and_all_examples_on_request(qtbot, theme
 
 def test_show_all_link_is_hidden_with_few_examples(page: StartPage) -> None:
     assert not [each for each in page.findChildren(LinkButton) if each.isVisible() and "All" in each.text()]
+
+
+def test_card_art_is_hidden_when_the_cards_need_more_room_later(qtbot, page: StartPage) -> None:
+    page.resize(1024, 530)
+    art = page.new_card.art
+    qtbot.waitUntil(art.isVisible)
+    button = page.new_card.findChildren(Button)[0]
+    button.setMinimumWidth(700)
+    qtbot.waitUntil(lambda: not art.isVisible())

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from PySide6.QtCore import QEvent, QRect, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QObject, QRect, Qt, QTimer, Signal
 from PySide6.QtGui import QKeySequence, QResizeEvent, QShortcut
 from PySide6.QtWidgets import (
     QBoxLayout,
@@ -231,6 +231,7 @@ class StartPage(QWidget):
         column.addWidget(area, 1)
         column.addWidget(line)
         area.setWidget(middle)  # the last step, because it styles the contents
+        content.installEventFilter(self)
 
     def banner_area(self) -> QRect:
         """Return the area for an alert, above the heading of the page."""
@@ -247,6 +248,12 @@ class StartPage(QWidget):
         if event.type() in {QEvent.Type.LayoutRequest, QEvent.Type.FontChange, QEvent.Type.Polish}:
             self._fit_cards()
         return handled
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        # The scroll area doesn't pass on that the contents need another size.
+        if event.type() == QEvent.Type.LayoutRequest:
+            self._fit_cards()
+        return super().eventFilter(watched, event)
 
     def _fit_room(self) -> None:
         min_room = round(self._theme.scaled(BANNER_LINE)) + 2 * BANNER_GAP - TOP_MARGIN
