@@ -156,7 +156,7 @@ def _main(arguments: Sequence[str]) -> int:
         except NepError as error:
             parser.error(str(error))
     if options.selftest is not None:
-        return end_process(self_test(options.selftest, web=options.web))
+        return self_test(options.selftest, web=options.web)
     if not options.web:
         parser.error(_("--no-web requires --selftest"))
     # saves a tenth of the start time; the window runs the collector itself (`app.ui.startup.interpreter`)
@@ -193,14 +193,15 @@ def restart(theme: str | None) -> None:
 
 
 def self_test(folder: Path, *, web: bool) -> int:
-    """Run the self-test in a real window and write its report.
+    """Run the self-test in a real window, write its report and end the process.
 
     Args:
         folder: Folder for the report.
         web: False to skip the block editor.
 
     Returns:
-        Exit code: 0 if all steps passed, 1 if a step failed (see the report), 2 if `folder` can't be written.
+        2 if `folder` can't be written. Otherwise the process ends with exit code 0 if all steps passed, or 1
+        if a step failed (see the report).
     """
     from app.core.self_test import SelfTest, UnwritableFolderError, prepare  # noqa: PLC0415  needed only here
 
@@ -224,7 +225,8 @@ def self_test(folder: Path, *, web: bool) -> int:
     outcome = test.report.failure or _("the self-test passed")
     with suppress(OSError, ValueError):  # the output stream may be closed; the report is the result
         (sys.stderr if code else sys.stdout).write(f"{outcome}: {test.environment.folder}\n")
-    return code
+    # The exit code is the result, which a crash of Qt at the end of the process would replace.
+    return end_process(code, is_immediate=True)
 
 
 def run_behaviour(arguments: Sequence[str]) -> int:
@@ -282,7 +284,7 @@ def join_threads(within_s: float) -> tuple[str, ...]:
     return tuple(thread.name for thread in other_threads if thread.is_alive())
 
 
-def end_process(code: int, within_s: float = JOIN_TIMEOUT_S) -> int:
+def end_process(code: int, within_s: float = JOIN_TIMEOUT_S, *, is_immediate: bool = False) -> int:
     """Wait for all non-daemon threads and return ``code``; if some don't end, log them and exit at once.
 
     Python waits for every non-daemon thread at exit. A plug-in's thread that never ends, or a thread that
@@ -291,13 +293,14 @@ def end_process(code: int, within_s: float = JOIN_TIMEOUT_S) -> int:
     Args:
         code: Exit code of the process.
         within_s: Maximum wait in seconds.
+        is_immediate: True to exit in any case, without the cleanup of Python and Qt.
     """
     running_threads = join_threads(within_s)
-    if not running_threads:
+    if not running_threads and not is_immediate:
         return code
-    _log.error(
-        "exiting while threads are still running: %s", ", ".join(f"'{name}'" for name in running_threads)
-    )
+    if running_threads:
+        names = ", ".join(f"'{name}'" for name in running_threads)
+        _log.error("exiting while threads are still running: %s", names)
     logging.shutdown()
     flush_streams()
     os._exit(code)

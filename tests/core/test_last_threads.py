@@ -17,6 +17,13 @@ threading.Thread(target=wait, name="{name}", daemon={daemon}).start()
 print("kept", flush=False)
 sys.exit(end_process(3, 0.1))
 """
+IMMEDIATE = """
+import atexit, os
+from app.__main__ import end_process
+atexit.register(os._exit, 7)
+print("kept")
+end_process(3, is_immediate=True)
+"""
 
 
 def ran(name: str, *, daemon: bool) -> subprocess.CompletedProcess[str]:
@@ -34,6 +41,13 @@ def test_process_exits_and_logs_the_threads_still_running() -> None:
 
 def test_daemon_threads_are_not_waited_for() -> None:
     done = ran("a daemon", daemon=True)
+    assert (done.returncode, done.stdout, done.stderr) == (3, "kept\n", "")
+
+
+def test_immediate_exit_keeps_output_and_exit_code_and_skips_cleanup() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", IMMEDIATE], check=False, capture_output=True, text=True, timeout=120
+    )
     assert (done.returncode, done.stdout, done.stderr) == (3, "kept\n", "")
 
 
