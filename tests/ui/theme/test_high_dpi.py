@@ -16,7 +16,7 @@ from PySide6.QtWidgets import QApplication
 
 application = QApplication(["nep-studio"])
 assert application.devicePixelRatio() == float(sys.argv[1]), application.devicePixelRatio()
-sys.exit(pytest.main(["-q", "tests/ui/theme/test_text_sizes.py::test_window_clips_no_text"]))
+sys.exit(pytest.main(["-q", "--long", "tests/ui/theme/test_text_sizes.py::test_window_clips_no_text"]))
 """
 
 
