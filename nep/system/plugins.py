@@ -65,9 +65,18 @@ def discover_own(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]
 
 
 def find_own(package: str, name: str, attribute: str, kind: type[T]) -> T | None:
-    """Return the plug-in of a package with this name if its module has the name, too; None otherwise.
+    """Return the plug-in of a package with this name, if its module has the same name; None otherwise.
 
     Imports no other plug-in.
+
+    Args:
+        package: Name of the package.
+        name: Name of the plug-in and of its module.
+        attribute: Name that the plug-in module binds.
+        kind: Required class of the bound object.
+
+    Raises:
+        OSError: The module can't be read, for example without a free file descriptor.
     """
     module = f"{package}.{name}"
     if not name.isidentifier() or importlib.util.find_spec(module) is None:
